@@ -57,6 +57,9 @@ export const WAITING = ["openParts", "reach", "settled", "arrived"];
 
 export const REPLACED = "another mesh was requested before all data for this one had arrived";
 
+/** A request that every mesh meets. @type {Record<string, any>} */
+const NOTHING = { error: Number.MAX_VALUE };
+
 /** What adds up over the steps of a refinement. */
 const SUMS = ["refined", "coarsened", "forced", "judged", "milliseconds"];
 
@@ -72,15 +75,18 @@ export function coreMethods(emit, shared = new SharedRanges()) {
   /** What has come of a stream until its base mesh is there, and the fields that are wanted of it. @type {Uint8Array[] | undefined} */
   let head;
   let wanted;
-  /** The last request. @type {Record<string, any>} */
-  let request = {};
+  /** The last request, and the one before it, which holds again if that is given up. @type {Record<string, any>} */
+  let request = NOTHING;
+  let before = NOTHING;
   /** @type {Parts | undefined} */
   let parts;
   /** Counts the requests. */
   let goal = 0;
+  /** The caller's number of the last one, if it may be given up. @type {number | undefined} */
+  let given;
   const setRequest = (options) => {
     session.request(options);
-    request = options ?? {};
+    [before, request, given] = [request, options ?? {}, undefined];
     goal++;
     parts?.turn();
   };
@@ -212,6 +218,7 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     async reach(options, what) {
       setRequest(await received(options));
       const mine = goal;
+      given = what.goal;
       let step = advanceAll();
       while (step.more) {
         const before = step.stats;
@@ -222,6 +229,10 @@ export function coreMethods(emit, shared = new SharedRanges()) {
       }
       if (mine === goal) return result(step, what);
       throw new TetralodError("replaced", REPLACED);
+    },
+    /** Gives a request up that waits for data, if it is the last one: nothing more is fetched for it. */
+    abandon(number) {
+      if (number === given) setRequest(before);
     },
     setRequest: async (options) => setRequest(await received(options)),
     step: (milliseconds, updates, what) => result(advance(milliseconds, updates), what),

@@ -21,6 +21,7 @@ import type { MtInfo, Source } from "./index.js";
 import type {
   CameraState,
   Legend,
+  Misfit,
   Overlay,
   Viewer,
   ViewerFrame,
@@ -35,8 +36,8 @@ export { TetralodError } from "./index.js";
 export type ViewerMode = "isosurface" | "volume" | "slice" | "boundary" | "cells";
 
 export interface TetralodViewerEventMap {
-  /** A volume is shown: its first picture is on the canvas. */
-  load: CustomEvent<{ info: MtInfo }>;
+  /** A volume is shown: its first picture is on the canvas. `dropped` is what of the state did not fit it. */
+  load: CustomEvent<{ info: MtInfo; dropped: Misfit[] }>;
   /** Something went wrong: see `failure`. The picture stays, if there is one. */
   error: CustomEvent<Error>;
   progress: CustomEvent<ViewerProgress>;
@@ -116,8 +117,55 @@ export class TetralodViewerElement extends HTMLElement {
   ): void;
 }
 
+/** What `<tetralod-viewer>` takes in JSX: its attributes and properties, and what any element takes. */
+export interface TetralodViewerJsx {
+  src?: string | URL | null | undefined;
+  source?: Source | null | undefined;
+  mode?: ViewerMode | null | undefined;
+  isovalue?: string | number | readonly number[] | null | undefined;
+  field?: string | null | undefined;
+  error?: string | number | null | undefined;
+  "max-tets"?: number | string | null | undefined;
+  maxTets?: number | string | null | undefined;
+  map?: string | null | undefined;
+  background?: "dark" | "light" | "transparent" | null | undefined;
+  label?: string | null | undefined;
+  static?: boolean | string | undefined;
+  "worker-url"?: string | undefined;
+  "wasm-url"?: string | undefined;
+  state?: { [K in keyof ViewerState]?: ViewerState[K] | null } | undefined;
+  onload?: ((event: TetralodViewerEventMap["load"]) => void) | undefined;
+  onerror?: ((event: TetralodViewerEventMap["error"]) => void) | undefined;
+  /** Everything else, whose types differ from library to library: `ref`, `key`, `className`, `style`, `children`, `aria-label`, … */
+  [other: string]: any;
+}
+
 declare global {
   interface HTMLElementTagNameMap {
     "tetralod-viewer": TetralodViewerElement;
+  }
+  /** React up to 18. */
+  namespace JSX {
+    interface IntrinsicElements {
+      "tetralod-viewer": TetralodViewerJsx;
+    }
+  }
+}
+
+// Libraries whose JSX has a namespace of its own. Each is known to the compiler only where it is installed.
+// @ts-ignore
+declare module "react" {
+  namespace JSX {
+    interface IntrinsicElements {
+      "tetralod-viewer": TetralodViewerJsx;
+    }
+  }
+}
+// @ts-ignore
+declare module "preact" {
+  namespace JSX {
+    interface IntrinsicElements {
+      "tetralod-viewer": TetralodViewerJsx;
+    }
   }
 }

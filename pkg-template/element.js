@@ -197,13 +197,13 @@ export class TetralodViewerElement extends Base {
     if (!viewer || !source) return this.#become("empty");
     this.#become("loading");
     // The first picture has the right things in it.
-    await viewer.set(this.#scene());
-    const { info } = await viewer.open(source, { signal: life.signal });
+    const { info, dropped } = await viewer.open(source, { signal: life.signal, state: this.#scene() });
     if (mine !== this.#opened) return;
+    if (dropped.length > 0) this.#state = kept(this.#state, viewer.state);
     await viewer.set(this.#scene(info));
     if (mine !== this.#opened) return;
     this.#become("ready");
-    this.#tell("load", { info });
+    this.#tell("load", { info, dropped });
     await viewer.refine(this.#request());
   }
 
@@ -369,6 +369,9 @@ for (const [attribute, property] of Object.entries(ATTRIBUTES)) {
     },
   });
 }
+
+/** What is left of the members of a state. */
+const kept = (state, now) => Object.fromEntries(Object.keys(state).map((name) => [name, now[name] ?? null]));
 
 const refused = (name, problem) => new TetralodError("bad-option", `attribute \`${name}\`: ${problem}`);
 

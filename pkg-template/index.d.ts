@@ -33,6 +33,7 @@ import type {
   Progress,
   RefineOptions,
   Slice,
+  Stored,
   Streamline,
   Surface,
   TetBatch,
@@ -58,6 +59,7 @@ export type {
   Progress,
   RefineOptions,
   Slice,
+  Stored,
   Streamline,
   Surface,
   TetBatch,
@@ -196,10 +198,21 @@ export interface ResultOptions<A extends MeshArray = MeshArray> {
    * @throws {TetralodError} `bad-option` with a worker, and with `deltas`
    */
   zeroCopy?: boolean;
+  /**
+   * Ends the wait: the call rejects with the signal's reason, by default an `AbortError`. The mesh is valid, somewhere between the one
+   * before and the one that was asked for; nothing more is fetched for the request, and what the one before it needs is fetched again.
+   * A mesh that had been made just then is lost with it: where deltas are applied, the next call is one without `deltas`.
+   *
+   * @example
+   * const mesh = await mt.refine({ error: "0.1%" }, { signal: AbortSignal.timeout(5000) });
+   */
+  signal?: AbortSignal | undefined;
 }
 
-/** The mesh after a refinement, in arrays that belong to the caller. */
+/** The mesh after a refinement: a {@link Mesh} in arrays that belong to the caller, what changed in it, and the numbers. */
 export interface RefineResult extends Mesh {
+  /** Where this mesh differs from the one that was handed out before. */
+  changes: MeshChanges;
   stats: RefineStats;
 }
 
@@ -221,7 +234,7 @@ export interface StepOptions<A extends MeshArray = MeshArray> {
 }
 
 /** A mesh without tetrahedra: {@link applyChanges} starts with it if no mesh has been returned before. */
-export function emptyMesh(): Mesh;
+export function emptyMesh(): Omit<RefineResult, "stats">;
 
 /**
  * Applies `delta` to `mesh`, and returns it. The arrays are written where `delta.changes` says. Arrays that are too
@@ -234,7 +247,7 @@ export function emptyMesh(): Mesh;
  * const mesh = emptyMesh();
  * applyChanges(mesh, await mt.refine({ error: "1%" }, { deltas: true }));
  */
-export function applyChanges<M extends Partial<Mesh> & Pick<Mesh, "changes">>(
+export function applyChanges<M extends Partial<Mesh> & Pick<RefineResult, "changes">>(
   mesh: M,
   delta: Partial<MeshDelta> & Pick<MeshDelta, "changes" | "vertexCount" | "tetCount">,
 ): M;
@@ -243,7 +256,7 @@ export function applyChanges<M extends Partial<Mesh> & Pick<Mesh, "changes">>(
  * What can be got out of the current mesh: the same calls in `MultiTessellation` and in `Viewer`. `Aside` is what
  * `MultiTessellation` takes besides.
  */
-export interface MeshTools<Aside = { request?: never }> {
+export interface MeshTools<Aside = AwaitOptions & { request?: never }> {
   /**
    * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex.
    * Normals point towards lower values: they are those of the field's gradient, or with `"smooth"` of the triangles.
@@ -306,8 +319,14 @@ export interface MeshTools<Aside = { request?: never }> {
   hash(): Promise<string>;
 }
 
+/** For a call that may take long. */
+export interface AwaitOptions {
+  /** Ends the wait: the call rejects with the signal's reason, by default an `AbortError`. The mesh stays as it is. */
+  signal?: AbortSignal | undefined;
+}
+
 /** For a call that answers from another mesh. */
-export interface AsideOptions {
+export interface AsideOptions extends AwaitOptions {
   /**
    * Answers from the mesh of this request, and leaves the current mesh as it is. It waits for the data that the request needs. There
    * is one more mesh for all such calls, as of {@link MultiTessellation.view}; a `field` is named in the request.
@@ -382,7 +401,8 @@ export class MultiTessellation extends WithMeshTools {
   /**
    * Refines the current mesh to a request and returns a copy of it. The cost grows with the difference from the last
    * mesh. It resolves when all data that the request needs has arrived. It rejects with `replaced` if another mesh is
-   * requested before that, or with the error that ended the download. With `partial` it resolves at once, with the best
+   * requested before that, or with the error that ended the download; a request that is refused, with code `bad-option`, changes
+   * nothing. With `partial` it resolves at once, with the best
    * mesh of the data that has arrived; `stats.missing` says whether more data is to come.
    *
    * @example
@@ -411,11 +431,11 @@ export class MultiTessellation extends WithMeshTools {
   refine<A extends MeshArray = MeshArray>(
     options?: RefineOptions,
     how?: ResultOptions<A> & { deltas?: false },
-  ): Promise<Pick<RefineResult, A | "changes" | "stats">>;
+  ): Promise<Pick<RefineResult, A | keyof Stored | "changes" | "stats">>;
   refine<A extends MeshArray = MeshArray>(
     options: RefineOptions | undefined,
     how: Omit<ResultOptions<A>, "zeroCopy"> & { deltas: true },
-  ): Promise<Pick<RefineDelta, A | "changes" | "stats" | "vertexCount" | "tetCount">>;
+  ): Promise<Pick<RefineDelta, A | keyof Stored | "changes" | "stats" | "vertexCount" | "tetCount">>;
 
   /**
    * The same in steps, each of which gives a mesh that is valid and within the budget. The loop ends when the mesh
@@ -431,11 +451,11 @@ export class MultiTessellation extends WithMeshTools {
   refineSteps<A extends MeshArray = MeshArray>(
     options?: RefineOptions,
     how?: StepOptions<A> & { deltas?: false },
-  ): AsyncGenerator<Pick<RefineResult, A | "changes" | "stats">, void, void>;
+  ): AsyncGenerator<Pick<RefineResult, A | keyof Stored | "changes" | "stats">, void, void>;
   refineSteps<A extends MeshArray = MeshArray>(
     options: RefineOptions | undefined,
     how: StepOptions<A> & { deltas: true },
-  ): AsyncGenerator<Pick<RefineDelta, A | "changes" | "stats" | "vertexCount" | "tetCount">, void, void>;
+  ): AsyncGenerator<Pick<RefineDelta, A | keyof Stored | "changes" | "stats" | "vertexCount" | "tetCount">, void, void>;
 
   /**
    * Another mesh of the same volume, for a second part of a program: its requests do not change this mesh, nor those of this one
@@ -549,6 +569,6 @@ export type ErrorCode =
 
 /** The errors of this package. Aborts are not among them: they reject with the signal's own reason. */
 export class TetralodError extends Error {
-  constructor(code: ErrorCode, message: string, options?: ErrorOptions);
+  constructor(code: ErrorCode, message: string, options?: { cause?: unknown });
   readonly code: ErrorCode;
 }

@@ -31,8 +31,11 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
   #inWorker;
   /** Why nothing can be called any more. */
   #closed;
-  /** Counts the requests: each one replaces those before it. */
+  /** The last request, and how many there were: each one replaces those before it, unless it is refused. */
   #goal = 0;
+  #goals = 0;
+  /** Settles when it is known whether the last one is refused. */
+  #judged = Promise.resolve();
   #source;
   #fetching;
   /** Other meshes of the volume. @type {Set<MultiTessellation>} */
@@ -58,8 +61,8 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
   /** @private use `MultiTessellation.open` */
   constructor(core, inWorker, onProgress) {
     super();
-    setCaller(this, (method, args, request) =>
-      request === undefined ? this.#core.call(method, args) : this.#askAside(request, method, args),
+    setCaller(this, (method, args, request, signal) =>
+      request === undefined ? this.#core.call(method, args) : this.#askAside(request, method, args, signal),
     );
     this.#core = core;
     this.#inWorker = inWorker;
@@ -100,14 +103,24 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
   }
 
   async refine(options = {}, how = {}) {
-    checkNames(how, ["deltas", "partial", "arrays", "zeroCopy"]);
-    const { deltas = false, partial = false, zeroCopy = false } = how;
+    checkNames(how, ["deltas", "partial", "arrays", "zeroCopy", "signal"]);
+    const { deltas = false, partial = false, zeroCopy = false, signal } = how;
+    signal?.throwIfAborted();
     if (zeroCopy && (this.#inWorker || deltas)) throw new TetralodError("bad-option", `option \`zeroCopy\`: ${NO_ZERO_COPY}`);
     const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays), zeroCopy: Boolean(zeroCopy) };
     const sent = sendable(options, this.#inWorker);
-    const goal = ++this.#goal;
+    const { goal, asked } = this.#request((number) => this.#make(number, sent, what, partial));
+    if (!signal) return asked;
+    return abortable(asked, signal).catch((error) => {
+      if (signal.aborted) this.#giveUp(goal);
+      throw error;
+    });
+  }
+
+  /** Makes the mesh of a request. */
+  async #make(goal, sent, what, partial) {
     const ask = async (method, ...more) => {
-      const args = [sent, what, ...more];
+      const args = [sent, { ...what, goal }, ...more];
       const { more: _, ...result } = await this.#wait(method, args, method === "reach");
       if (result.stats) this.#emit("stats", result.stats);
       return result;
@@ -121,6 +134,25 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
     return ask("refine", true);
   }
 
+  /** Makes a request, which replaces those before it unless it is refused. `ask` gets its number. */
+  #request(ask) {
+    const before = this.#goal;
+    const goal = (this.#goal = ++this.#goals);
+    const asked = ask(goal);
+    const refused = (error) => {
+      if (error?.code === "bad-option" && this.#goal === goal) this.#goal = before;
+    };
+    this.#judged = asked.then(() => {}, refused);
+    return { goal, asked };
+  }
+
+  /** The one before it holds again. */
+  #giveUp(goal) {
+    if (goal !== this.#goal) return;
+    this.#goal = ++this.#goals;
+    this.#core.call("abandon", [goal]).catch(() => {});
+  }
+
   async *refineSteps(options = {}, how = {}) {
     checkNames(how, STEP_OPTIONS);
     const { budgetMs = how.updates === undefined ? 8 : Infinity, updates = Infinity, deltas = false, signal } = how;
@@ -128,17 +160,23 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
     checkAmount("updates", updates, 1);
     signal?.throwIfAborted();
     const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays) };
-    const goal = ++this.#goal;
-    await this.#core.call("setRequest", [sendable(options, this.#inWorker)]);
-    for (let done = false; !done && goal === this.#goal; ) {
+    const sent = sendable(options, this.#inWorker);
+    const { goal, asked } = this.#request(() => this.#core.call("setRequest", [sent]));
+    await asked;
+    for (let done = false; !done && (await this.#isLast(goal)); ) {
       signal?.throwIfAborted();
       const { more, ...step } = await this.#core.call("step", [budgetMs, updates, what]);
       this.#emit("stats", step.stats);
       yield step;
       done = !more;
-      if (!more || !step.stats.done || goal !== this.#goal) continue;
+      if (!more || !step.stats.done || !(await this.#isLast(goal))) continue;
       await abortable(this.#wait("arrived"), signal);
     }
+  }
+
+  async #isLast(goal) {
+    if (goal !== this.#goal) await this.#judged;
+    return goal === this.#goal;
   }
 
   async setField(field) {
@@ -161,12 +199,12 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
   }
 
   /** Answers from the mesh of another request; the current mesh stays as it is. One such call after the other. */
-  #askAside(request, method, args) {
+  #askAside(request, method, args, signal) {
     const answer = async () => {
       this.#aside ??= this.view();
       this.#aside.catch(() => (this.#aside = undefined));
       const aside = await this.#aside;
-      await aside.refine(request, { arrays: [] });
+      await aside.refine(request, { arrays: [], signal });
       return aside.#core.call(method, args);
     };
     const answered = this.#asked.then(answer);

@@ -60,10 +60,12 @@ const MOVEMENTS = ["orbit", "pan", "fly", "look"];
 /** Two sets of changes as one: movements add up, of everything else the later one counts. */
 export function mergeUpdates(a, b) {
   const merged = { ...a, ...b };
+  const isHome = Boolean(b.home || b.side);
+  const earlier = isHome ? a.sets?.map(({ camera, ...set }) => set) : a.sets;
+  if (a.sets || b.sets) merged.sets = [...(earlier ?? []), ...(b.sets ?? [])];
   // A camera that is set forgets the movements before it.
-  if (b.home || b.side || b.camera) {
+  if (isHome || b.sets?.some(({ camera }) => camera)) {
     for (const name of [...MOVEMENTS, "zoom"]) if (b[name] === undefined) delete merged[name];
-    if (b.camera === undefined) delete merged.camera;
     return merged;
   }
   for (const name of MOVEMENTS) {

@@ -1,19 +1,23 @@
 /** What can be got out of the current mesh: the same calls in `MultiTessellation` and in `Viewer`. */
 
 import { TetralodError } from "./errors.js";
+import { abortable } from "./stream.js";
 
 /**
  * What passes a call on to the session, of each object with these calls; with `request`, to the mesh that this asks for.
  *
- * @type {WeakMap<object, (method: string, args: any[], request?: object) => Promise<any>>}
+ * @type {WeakMap<object, (method: string, args: any[], request?: object, signal?: AbortSignal) => Promise<any>>}
  */
 const callers = new WeakMap();
 
 /** Says what passes the calls of `object` on to its session. */
 export const setCaller = (object, call) => callers.set(object, call);
 
-/** Passes a call on. */
-const call = (object, method, args, request) => /** @type {any} */ (callers.get(object))(method, args, request);
+/** Passes a call on; the end of the signal ends the wait for its answer. */
+async function call(object, method, args, { request, signal } = /** @type {any} */ ({})) {
+  signal?.throwIfAborted();
+  return abortable(/** @type {any} */ (callers.get(object))(method, args, request, signal), signal);
+}
 
 /**
  * A class with these calls.
@@ -23,38 +27,38 @@ const call = (object, method, args, request) => /** @type {any} */ (callers.get(
 export const withMeshTools = (Base) =>
   class extends Base {
     async isosurface(values, how = {}) {
-      checkNames(how, ["normals", "request"]);
-      const { normals = "gradient", request } = how;
+      checkNames(how, ["normals", "request", "signal"]);
+      const { normals = "gradient" } = how;
       if (normals !== "gradient" && normals !== "smooth") {
         throw new TetralodError("bad-option", 'option `normals`: must be "gradient" or "smooth"');
       }
       const list = typeof values === "number" ? [values] : values;
-      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth"], request);
+      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth"], how);
     }
 
     async slice(normal, offset, how = {}) {
-      checkNames(how, ["request"]);
+      checkNames(how, ["request", "signal"]);
       if (typeof offset !== "number") throw new TetralodError("bad-option", "option `offset`: must be a number");
-      return call(this, "slice", [numbers("normal", normal), offset], how.request);
+      return call(this, "slice", [numbers("normal", normal), offset], how);
     }
 
     async surface(how = {}) {
-      checkNames(how, ["request"]);
-      return call(this, "surface", [], how.request);
+      checkNames(how, ["request", "signal"]);
+      return call(this, "surface", [], how);
     }
 
     async probe(points, how = {}) {
-      checkNames(how, ["request"]);
-      return call(this, "probe", [numbers("points", points)], how.request);
+      checkNames(how, ["request", "signal"]);
+      return call(this, "probe", [numbers("points", points)], how);
     }
 
     async line(from, to, how = {}) {
-      checkNames(how, ["request"]);
-      return call(this, "line", [numbers("from", from), numbers("to", to)], how.request);
+      checkNames(how, ["request", "signal"]);
+      return call(this, "line", [numbers("from", from), numbers("to", to)], how);
     }
 
     async streamlines(fields, seeds, how = {}) {
-      checkNames(how, ["backward", "maxLength", "maxSteps", "request"]);
+      checkNames(how, ["backward", "maxLength", "maxSteps", "request", "signal"]);
       const { backward = false, maxLength = Infinity, maxSteps = 10_000 } = how;
       if (!Array.isArray(fields) || fields.length !== 3 || fields.some((name) => typeof name !== "string")) {
         throw new TetralodError("bad-option", "streamlines: a vector field is the names of three fields");
@@ -62,15 +66,15 @@ export const withMeshTools = (Base) =>
       checkAmount("maxLength", maxLength, 0);
       checkAmount("maxSteps", maxSteps, 1);
       const args = [fields, numbers("seeds", seeds), Boolean(backward), maxLength, maxSteps];
-      return call(this, "streamlines", args, how.request);
+      return call(this, "streamlines", args, how);
     }
 
     async stats(how = {}) {
-      checkNames(how, ["bins", "range", "fractions", "request"]);
+      checkNames(how, ["bins", "range", "fractions", "request", "signal"]);
       const { bins = 100, range = [NaN, NaN], fractions = [] } = how;
       checkAmount("bins", bins, 1);
       if (range?.length !== 2) throw new TetralodError("bad-option", "option `range`: must be two numbers");
-      return call(this, "stats", [bins, range[0], range[1], numbers("fractions", fractions)], how.request);
+      return call(this, "stats", [bins, range[0], range[1], numbers("fractions", fractions)], how);
     }
 
     async hash() {

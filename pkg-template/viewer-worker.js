@@ -7,6 +7,7 @@
 
 import init, { Gpu, RangeLoader, Viewer } from "./tetralod_viewer.js";
 import { TetralodError, flattenError } from "./errors.js";
+import { changedScene, checkFields, fitScene } from "./fit.js";
 import { received } from "./options.js";
 import { Parts } from "./parts.js";
 import { serve, webEndpoint } from "./rpc.js";
@@ -35,9 +36,13 @@ const MOST_SAMPLES = 256;
 let viewer;
 /** Fetches the blocks of a file that is read in parts. @type {Parts | undefined} */
 let parts;
+/** What a mesh is without a request: what the picture shows, within a budget that any machine can draw. */
+const FIRST_REQUEST = { view: { pixels: 1, outside: "10%" }, maxTets: 500_000 };
 /** The last request, and whether the viewer has it: it takes none before the base mesh has arrived. */
-let request = {};
+let request = FIRST_REQUEST;
 let isRequested = false;
+/** The request before it, which holds again if it is given up. */
+let before = FIRST_REQUEST;
 /** Counts the requests; steps carry the number of their request. */
 let goal = 0;
 /** The work for it: the sums over its steps. */
@@ -68,8 +73,14 @@ let tets = 0;
 let affordable = Infinity;
 /** The number that the mesh is held to now. @type {number | undefined} */
 let held;
-/** What is drawn. */
+/** What is drawn. @type {Record<string, any>} */
 let shown = {};
+/** The volume that it is drawn of, once its base mesh is there. @type {{ fields: any[], bounds: number[] } | undefined} */
+let volume;
+/** What is to be drawn of the volume that is being opened, and what did not fit it. */
+let wanted;
+/** @type {{ part: string, problem: string }[]} */
+let dropped = [];
 /** Whether a screenshot is being made: frames wait for it. */
 let isTaking = false;
 
@@ -118,9 +129,11 @@ const methods = {
     return { adapter: viewer.adapter() };
   },
 
-  clear(fields) {
+  clear(fields, state) {
+    const first = firstScene(state);
     methods.halt();
     viewer.clear(fields);
+    wanted = first;
     forget();
   },
 
@@ -129,6 +142,7 @@ const methods = {
     const progress = viewer.feed(chunk);
     bytes = progress.bytes;
     if (!progress.ready) return { progress };
+    meet();
     const first = !ready;
     ready = true;
     const due = performance.now() - lastRefine.end > Math.max(FOLLOW, 2 * lastRefine.took);
@@ -138,14 +152,15 @@ const methods = {
     await drawn();
     // Whoever opened it finds the camera that looks at it, also where the picture takes long.
     report("camera", viewer.camera());
-    return { progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
+    return { progress, ...met() };
   },
 
   /**
    * Opens a file in parts; resolves to nothing where the server gives no ranges, and otherwise when it has been drawn. What
    * is shown stays until the first bytes are here.
    */
-  async openParts(url, { fields, memory, ...options }) {
+  async openParts(url, { fields, memory, state, ...options }) {
+    const first = firstScene(state);
     methods.halt();
     const make = (loader) => {
       viewer.openParts(fields, memory, loader);
@@ -156,7 +171,11 @@ const methods = {
           try {
             return viewer.supply();
           } finally {
-            if (before && !viewer.isOpening) forget();
+            if (before && !viewer.isOpening) {
+              wanted = first;
+              forget();
+            }
+            if (!viewer.isOpening) meet();
           }
         },
         get isWaiting() {
@@ -178,7 +197,7 @@ const methods = {
     invalidate();
     await drawn();
     report("camera", viewer.camera());
-    return { progress: { ...mine.progress, traffic: mine.traffic }, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
+    return { progress: { ...mine.progress, traffic: mine.traffic }, ...met() };
   },
 
   /**
@@ -209,27 +228,34 @@ const methods = {
 
   /** Resolves at once, to the number of the request; its steps are reported as `stats` with this number. */
   async setRequest(options) {
-    request = await received(options);
-    setRequest();
+    setRequest(await received(options));
     return goal;
+  },
+
+  /** Makes the first request, unless there is one. */
+  follow() {
+    if (ready && !isRequested) follow();
+  },
+
+  /** Gives a request up, if it is the last one: the one before it holds again. */
+  abandon(given) {
+    if (given === goal && ready) setRequest(before);
   },
 
   /**
    * Applies what has been set since the last call, in one go.
    *
-   * @param {{ size?: [number, number, number], orbit?: [number, number], pan?: [number, number],
+   * Changes of the scene and the camera are made or refused one by one; what is wrong in one does not keep others back.
+   *
+   * @param {{ sets?: { id: number, changes: object, camera?: object }[], size?: [number, number, number], orbit?: [number, number], pan?: [number, number],
    *   zoom?: [number, number, number], fly?: [number, number, number], look?: [number, number],
    *   [setting: string]: any }} settings
    */
-  update({ scene, camera, orbit, zoom, pan, fly, look, home, side, size }) {
+  update({ sets = [], orbit, zoom, pan, fly, look, home, side, size }) {
     if (size) viewer.resize(...size);
-    if (scene) {
-      viewer.setScene(scene);
-      shown = scene;
-    }
     if (home) viewer.home();
     if (side) viewer.lookFrom(side);
-    if (camera) viewer.setCamera(camera);
+    const refused = sets.flatMap((one) => change(one) ?? []);
     if (orbit) viewer.orbit(...orbit);
     if (zoom) viewer.zoom(...zoom);
     if (pan) viewer.pan(...pan);
@@ -238,6 +264,7 @@ const methods = {
     if (size) current = 1;
     else move();
     invalidate();
+    return { scene: shown, refused: Object.fromEntries(refused) };
   },
 
   setFrameTime(milliseconds) {
@@ -344,7 +371,7 @@ function takeAhead(url) {
 function reading(numbers) {
   if (!numbers) return undefined;
   const [x, y, z, tet, size, error, shown, ...values] = numbers;
-  const { fields } = viewer.info();
+  const { fields } = /** @type {{ fields: any[] }} */ (volume);
   // Of the time steps of a field that which is shown counts, or the first.
   const all = values.map((value, i) => ({ ...fields[i], value })).reverse();
   const now = all.filter(({ time }) => time === fields[shown].time);
@@ -368,9 +395,66 @@ function followParts() {
   invalidate();
 }
 
+/**
+ * Makes a change of the scene or the camera, or nothing and its number with what is wrong.
+ *
+ * @param {{ id: number, changes: object, camera?: any }} set
+ * @returns {[number, object][] | undefined}
+ */
+function change({ id, changes, camera }) {
+  try {
+    const scene = changedScene(shown, changes);
+    if (volume) checkFields(scene, volume);
+    viewer.setScene(scene);
+    try {
+      if (camera) viewer.setCamera(camera);
+    } catch (error) {
+      viewer.setScene(shown);
+      throw error;
+    }
+    shown = scene;
+    return undefined;
+  } catch (error) {
+    return [[id, flattenError(error)]];
+  }
+}
+
+/**
+ * What is to be drawn of a volume that is opened with this state; throws where that is wrong for any volume.
+ *
+ * @param {Record<string, any>} [state]
+ */
+function firstScene({ camera, ...changes } = {}) {
+  const scene = changedScene(shown, changes);
+  viewer.setScene(scene);
+  viewer.setScene(shown);
+  return { scene, camera };
+}
+
+/** The base mesh has arrived: draws of it what fits. */
+function meet() {
+  const info = volume ? undefined : viewer.info();
+  if (!info) return;
+  volume = { ...info, bounds: Array.from(viewer.bounds()) };
+  const { scene = shown, camera } = wanted ?? {};
+  wanted = undefined;
+  ({ scene: shown, dropped } = fitScene(scene, volume));
+  viewer.setScene(shown);
+  try {
+    if (camera) viewer.setCamera(camera);
+  } catch (error) {
+    dropped.push({ part: "camera", problem: error.message });
+  }
+}
+
+/** What is told of a volume that has been opened. */
+const met = () => ({ info: volume, scene: shown, dropped });
+
 /** Another volume has taken the place of the one before. */
 function forget() {
-  request = {};
+  [request, before, volume, dropped] = [FIRST_REQUEST, FIRST_REQUEST, undefined, []];
+  // What is reported next is of another volume, even if it is the same.
+  reported.clear();
   isRequested = false;
   bytes = 0;
   ready = false;
@@ -379,9 +463,10 @@ function forget() {
   invalidate();
 }
 
-/** Passes the request to the viewer; throws if it is not valid. */
-function setRequest() {
-  viewer.request(request);
+/** Passes a request to the viewer; throws if it is not valid, and the one before it holds. */
+function setRequest(next) {
+  viewer.request(next);
+  [before, request] = [request, next];
   parts?.turn();
   isRequested = true;
   goal++;
@@ -392,7 +477,7 @@ function setRequest() {
 /** Applies the last request to new data; an error of the request is reported, not thrown. */
 function follow() {
   try {
-    if (!isRequested) setRequest();
+    if (!isRequested) setRequest(request);
     viewer.requestAgain();
     invalidate();
   } catch (error) {

@@ -102,9 +102,30 @@ export interface BlockMap {
   states: Uint8Array;
 }
 
+/** A part of a scene that does not fit a volume, and is left out. */
+export interface Misfit {
+  /** Its name, such as `slices[0].field`. */
+  part: string;
+  /** What is wrong, in words. */
+  problem: string;
+}
+
+/** How a volume is opened. */
+export interface ViewerOpenOptions extends ReadOptions {
+  /** Ends the download; pending calls for it reject with the signal's reason. */
+  signal?: AbortSignal | undefined;
+  /** What is drawn from the first picture on: changes as for `set`, of which all that fits the volume is used. */
+  state?: { [K in keyof ViewerState]?: ViewerState[K] | null };
+}
+
 /** A volume that has been opened. */
 export interface OpenedVolume {
   info: MtInfo;
+  /**
+   * What of the scene did not fit this volume, and is not drawn: fields that it does not have, values that none of its fields has,
+   * planes, boxes and points elsewhere. `state` is what is drawn. Empty where all of it fits.
+   */
+  dropped: Misfit[];
   /** Its URL or kind. */
   name: string;
   /** Its size in bytes where that is known. */
@@ -126,7 +147,7 @@ export interface PlaneState {
 
 /** An isosurface. */
 export interface IsosurfaceState {
-  /** In field units; the middle of the field's range without it. */
+  /** In field units; without it the middle of the field's range over all of its time steps. */
   value?: number;
   /** 0 to 1; 1 without it. */
   opacity?: number;
@@ -198,7 +219,7 @@ export interface StreamlineState {
   seeds: [number, number, number][];
   /** In model units; 1/400 of the domain's diagonal without it. */
   radius?: number;
-  /** The field that colours them; the speed without it. */
+  /** The field that colours them; the speed without it, from 0 to the largest that the ranges of the components allow. */
   field?: string;
 }
 
@@ -208,7 +229,7 @@ export interface ArrowState {
   fields: [string, string, string];
   /** From one to the next, in model units; 1/20 of the domain's diagonal without it. */
   spacing?: number;
-  /** The field that colours them; the magnitude without it. */
+  /** The field that colours them; the magnitude without it, with the colours of the speed of `streamlines`. */
   field?: string;
   /** Makes all of one length. */
   constant?: boolean;
@@ -229,11 +250,14 @@ export interface CompareState {
 export interface ColourState {
   /** The name of a colour map, such as `"viridis"`, `"turbo"`, `"coolwarm"` or `"grey"`. */
   map?: string;
-  /** The values with the first and the last colour; the range of what is coloured without it. */
+  /**
+   * The values of the field that is shown with the first and the last colour. Without it, and for other fields: their range over all of
+   * their time steps, so that a colour means the same at all times.
+   */
   range?: [number, number];
   /** Lets the colours run backwards. */
   reversed?: boolean;
-  /** A logarithmic scale; the range must be positive. */
+  /** A logarithmic scale; a `range` must be positive. Without one it has the positive part of the values, and is linear where there is none. */
   log?: boolean;
 }
 
@@ -289,7 +313,7 @@ export interface Legend {
   log: boolean;
   /** Evenly spaced CSS colours from the lower to the upper end of the range. */
   colours: string[];
-  /** `fraction` is where the tick is in the range, 0 to 1. */
+  /** The ends of the range, and round numbers between them, ascending; `fraction` is where the tick is in the range, 0 to 1. */
   ticks: { value: number; label: string; fraction: number }[];
 }
 
@@ -407,7 +431,10 @@ export class Viewer extends EventTargetWithMeshTools {
   private constructor(canvas: HTMLCanvasElement);
   /** Rejects with code `no-webgpu`, and the reason, if WebGPU is not available. */
   static check(): Promise<void>;
-  /** Transfers the canvas to the worker, permanently; rejects with code `no-webgpu` before that if there is no WebGPU. */
+  /**
+   * Hands the canvas to a worker; rejects with code `no-webgpu` before that if there is no WebGPU. One viewer at a time can have a
+   * canvas: free it before you make another one, and pass a `signal` to give up one that is being made.
+   */
   static create(canvas: HTMLCanvasElement, options?: ViewerOptions): Promise<Viewer>;
 
   /** The description of the volume; `undefined` until its base mesh has arrived. */
@@ -425,24 +452,38 @@ export class Viewer extends EventTargetWithMeshTools {
 
   /**
    * Opens a volume in place of the one before; resolves when its base mesh has been drawn. URLs are fetched in parts where
-   * the server gives byte ranges: the mesh is refined as blocks arrive.
+   * the server gives byte ranges: the mesh is refined as blocks arrive. Without a call of `refine` the mesh becomes the one that the
+   * picture needs, within a pixel, of at most 500 000 tetrahedra: `refine({ view: { pixels: 1, outside: "10%" }, maxTets: 500_000 })`.
+   *
+   * What was drawn before is drawn of this volume, too, as far as it fits; `dropped` of the result says what does not.
+   *
+   * @example
+   * const { info, dropped } = await viewer.open("flow.mt", { state: { streamlines: { fields: ["u", "v", "w"], seeds: [[0, 0, 0]] } } });
+   * for (const { part, problem } of dropped) console.warn(`${part}: ${problem}`);
+   * @throws {TetralodError} when the source cannot be read or is not an MT file; what was open stays, unless it came as a stream
    */
-  open(source: Source, options?: ReadOptions & { signal?: AbortSignal }): Promise<OpenedVolume>;
+  open(source: Source, options?: ViewerOpenOptions): Promise<OpenedVolume>;
   /**
    * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, and all
    * data that it needs has arrived. Rejects with the error that prevents it.
    */
-  settled(): Promise<void>;
+  settled(options?: { signal?: AbortSignal | undefined }): Promise<void>;
   /** Continues such a file after an error. Rejects with `changed` if it was replaced on the server: open it again. */
   retry(): Promise<void>;
   /**
    * Requests another mesh. While the file streams in, and with the camera's own view while that moves, the mesh follows
-   * this request. Resolves when the mesh is complete; a call that was replaced resolves together with the later one.
+   * this request. Resolves when the mesh is complete; a call that was replaced resolves together with the later one. A request that
+   * is refused, with code `bad-option`, changes nothing.
+   *
+   * `signal` ends the wait: the call rejects with the signal's reason, by default an `AbortError`, and the request before it holds
+   * again.
    *
    * @example
    * await viewer.refine({ view: { pixels: 1, outside: "10%" }, maxTets: 300_000 });
+   * @example
+   * await viewer.refine({ error: "0.1%" }, { signal: AbortSignal.timeout(2000) });
    */
-  refine(options?: ViewerRefineOptions): Promise<ViewerStats>;
+  refine(options?: ViewerRefineOptions, how?: { signal?: AbortSignal | undefined }): Promise<ViewerStats>;
   /**
    * Keeps a copy of the mesh as it is, with all fields, in place of one that was kept before; another volume forgets it.
    *
@@ -460,7 +501,8 @@ export class Viewer extends EventTargetWithMeshTools {
   freeze(on?: boolean): Promise<void>;
   /**
    * Changes what is drawn, and the camera: what is named replaces what was there, `null` gives it its default, all else
-   * stays. Rejects with code `bad-option`, and changes nothing, if something is wrong.
+   * stays. Rejects with code `bad-option`, and changes nothing, if something is wrong: a value, or a field that the volume does not
+   * have. Before a volume is open, any names of fields will do: see `dropped` of `open`.
    *
    * @example
    * await viewer.set({ isosurfaces: [], slices: [{ normal: [0, 0, 1], offset: 0.5 }], colours: { map: "magma" } });
@@ -500,6 +542,7 @@ export class Viewer extends EventTargetWithMeshTools {
     samples?: number;
     /** That of the scene without it. */
     background?: SceneState["background"];
+    signal?: AbortSignal | undefined;
   }): Promise<Blob>;
   /** The handle of the region (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
   pickRegion(x: number, y: number): Promise<number>;
@@ -512,10 +555,14 @@ export class Viewer extends EventTargetWithMeshTools {
    * @example
    * const { positions, tets } = await viewer.mesh();
    */
-  mesh(): Promise<Omit<Mesh, "changes">>;
+  mesh(): Promise<Mesh>;
   /** Where the blocks of the file are, and which of them are here; `undefined` for a file without blocks. */
   blockMap(): Promise<BlockMap | undefined>;
-  /** Stops the worker; the canvas keeps its last picture. Pending and later calls reject with code `freed`. */
+  /**
+   * Stops the worker. Pending and later calls reject with code `freed`. Another viewer can be made of the canvas then, as React's
+   * `StrictMode` does: since a browser hands a canvas to a worker only once, the picture of that one is on a canvas of its own, which
+   * lies over this one, lets the pointer through, and goes when that viewer is freed.
+   */
   free(): void;
   [Symbol.dispose](): void;
 

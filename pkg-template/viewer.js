@@ -6,6 +6,7 @@
  */
 
 import { TetralodError, reviveError } from "./errors.js";
+import { changedScene } from "./fit.js";
 import { Latest, deferred, mergeUpdates } from "./latest.js";
 import { openOptions, sendable } from "./options.js";
 import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
@@ -21,7 +22,7 @@ const NO_ADAPTER =
 
 const NO_PAGE = 'a viewer draws on a canvas of a page; elsewhere, use MultiTessellation of "tetralod"';
 const USED_CANVAS =
-  "`canvas` has been used by another viewer, or has a context of its own; give each viewer a new canvas element";
+  "`canvas` belongs to another viewer, or has a context of its own; free that viewer first, or give each a canvas of its own";
 
 /** The worker of a viewer. */
 const VIEWER = {
@@ -35,6 +36,12 @@ const VIEWER = {
 /** A GPU that is lost is opened again after these waits (in ms): drivers take some time to start. */
 const WAITS = [0, 500, 2000, 8000];
 
+/** Who asks for no mesh so long after a volume has been opened (in ms) gets the one that the picture needs. */
+const UNASKED = 100;
+
+/** Canvases that were handed over, which can be done once: who draws on them now. @type {WeakMap<HTMLCanvasElement, Viewer | undefined>} */
+const holders = new WeakMap();
+
 /** What is drawn before something else is set: the isosurface in the middle of the field's range. */
 const SCENE = { isosurfaces: [{}] };
 
@@ -42,7 +49,7 @@ export class Viewer extends withMeshTools(EventTarget) {
   #remote;
   #canvas;
   #observer;
-  /** What the picture is on after the GPU was lost. @type {HTMLCanvasElement | undefined} */
+  /** What the picture is on where the canvas cannot show another one. @type {HTMLCanvasElement | undefined} */
   #cover;
   #info;
   #adapter;
@@ -55,8 +62,11 @@ export class Viewer extends withMeshTools(EventTarget) {
   #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
   #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRegion", [handle, x, y]));
   #pick = new Latest(([x, y]) => this.#remote.call("pick", [x, y]));
-  /** What is drawn. @type {Record<string, any>} */
-  #scene = SCENE;
+  /** What is drawn, and changes of it that are on their way, by their numbers. @type {Record<string, any>} */
+  #scene = {};
+  /** @type {Map<number, object>} */
+  #changes = new Map();
+  #sets = 0;
   #camera;
   #frameTime;
   #legend;
@@ -71,7 +81,7 @@ export class Viewer extends withMeshTools(EventTarget) {
   }
 
   /**
-   * Transfers the canvas to the worker, permanently, and starts the worker.
+   * Hands the canvas to a new worker. When the viewer has been freed, another one can be made of it.
    *
    * @param {HTMLCanvasElement} canvas
    * @param {{
@@ -124,12 +134,12 @@ export class Viewer extends withMeshTools(EventTarget) {
   }
 
   async #start(frameTime) {
-    const offscreen = handOver(this.#canvas);
+    const offscreen = this.#handOver();
     const [width, height] = (this.#size = pixels(this.#canvas.getBoundingClientRect()));
     const args = [offscreen, width, height, devicePixelRatio, frameTime];
     const created = await this.#remote.call("create", args, [offscreen]);
     this.#adapter = created.adapter;
-    await this.#change({ scene: this.#scene });
+    await this.set(SCENE);
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
@@ -143,6 +153,23 @@ export class Viewer extends withMeshTools(EventTarget) {
       // Safari does not support device pixels here.
       this.#observer.observe(this.#canvas);
     }
+  }
+
+  /** A canvas can be handed to a worker once: another one covers it where that has been done. */
+  #handOver() {
+    const canvas = this.#canvas;
+    if (!holders.has(canvas)) {
+      const offscreen = handOver(canvas);
+      holders.set(canvas, this);
+      return offscreen;
+    }
+    if (holders.get(canvas)) throw new TetralodError("bad-option", USED_CANVAS);
+    holders.set(canvas, this);
+    // The last picture of the viewer before is not seen through this one; the focus of the canvas is.
+    canvas.style.objectPosition = "-99999px 0";
+    this.#cover = coverOf(canvas);
+    canvas.after(this.#cover);
+    return this.#cover.transferControlToOffscreen();
   }
 
   #heard(name, data) {
@@ -163,10 +190,7 @@ export class Viewer extends withMeshTools(EventTarget) {
   async #restore(error) {
     for (const wait of WAITS) {
       await new Promise((resolve) => setTimeout(resolve, wait));
-      const cover = document.createElement("canvas");
-      // Not as an attribute, which a Content-Security-Policy forbids.
-      cover.style.cssText = coverStyle(this.#canvas);
-      cover.ariaHidden = "true";
+      const cover = coverOf(this.#canvas);
       const offscreen = cover.transferControlToOffscreen();
       const args = [offscreen, ...pixels(this.#canvas.getBoundingClientRect()), devicePixelRatio];
       try {
@@ -232,18 +256,19 @@ export class Viewer extends withMeshTools(EventTarget) {
 
   /** All that is set: what is drawn, and `camera`. A copy, as plain data; `set` takes it. */
   get state() {
-    return structuredClone({ ...this.#scene, camera: this.#camera });
+    return structuredClone({ ...[...this.#changes.values()].reduce(changedScene, this.#scene), camera: this.#camera });
   }
 
   /**
    * Streams a volume in, in place of the one before. Resolves when its base mesh has been drawn; `finished` of the
-   * result when the whole file has arrived.
+   * result when the whole file has arrived. What is drawn is `state` over what was drawn before, as far as it fits the volume.
    *
    * @param {any} source
-   * @param {{ signal?: AbortSignal, [how: string]: any }} [options]
+   * @param {{ signal?: AbortSignal, state?: object, [how: string]: any }} [options]
    */
-  async open(source, { signal, ...how } = {}) {
-    const fetching = openOptions(how, ["signal"]);
+  async open(source, { signal, state, ...how } = {}) {
+    signal?.throwIfAborted();
+    const fetching = { ...openOptions(how, ["signal", "state"]), state: sendable(state ?? {}, true) };
     this.#stream?.abort(new DOMException("another volume was opened", "AbortError"));
     const control = new AbortController();
     this.#stream = control;
@@ -252,7 +277,7 @@ export class Viewer extends withMeshTools(EventTarget) {
     const inParts = ranges && (await this.#openParts({ ...fetching, ...ranges }, stopped));
     if (inParts) return inParts;
     const opened = await openSource(source, stopped, fetching);
-    await this.#remote.call("clear", [fetching.fields]);
+    await this.#remote.call("clear", [fetching.fields, fetching.state]);
     stopped.throwIfAborted();
     this.#info = undefined;
     const { promise: ready, resolve, reject } = deferred();
@@ -260,12 +285,12 @@ export class Viewer extends withMeshTools(EventTarget) {
       throw naming(opened.name, error);
     });
     finished.catch(reject);
-    const info = await ready;
+    const { info, dropped } = await ready;
     // A failure after this point rejects `finished`, which may have no handler.
     finished.catch((error) => {
       if (error?.name !== "AbortError") this.#emit("error", error);
     });
-    return { info, name: opened.name, total: opened.total, finished };
+    return { info, dropped, name: opened.name, total: opened.total, finished };
   }
 
   async #openParts({ url, whole, ...options }, signal) {
@@ -273,22 +298,30 @@ export class Viewer extends withMeshTools(EventTarget) {
     signal.addEventListener("abort", () => this.#remote.call("halt").catch(() => {}), { once: true });
     const opened = await abortable(this.#remote.call("openParts", [url, options]), signal);
     if (!opened) return undefined;
-    this.#info = opened.info;
-    this.#requested = resolve;
+    [this.#info, this.#scene] = [opened.info, opened.scene];
+    const unasked = setTimeout(() => this.#remote.call("follow").then(resolve, () => {}), UNASKED);
+    this.#requested = () => {
+      clearTimeout(unasked);
+      resolve();
+    };
+    signal.addEventListener("abort", () => clearTimeout(unasked), { once: true });
     const finished = abortable(promise.then(() => this.settled()), signal);
     // The worker reports errors by itself.
     finished.catch(() => {});
     this.#emit("progress", opened.progress);
-    return { info: opened.info, name: options.name ?? url, total: opened.progress.total, finished };
+    const { info, dropped, progress } = opened;
+    return { info, dropped, name: options.name ?? url, total: progress.total, finished };
   }
 
   /**
    * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, and all
    * data that it needs has arrived.
+   *
+   * @param {{ signal?: AbortSignal }} [how]
    */
-  async settled() {
-    await this.#sent();
-    await this.#remote.call("settled");
+  async settled({ signal } = {}) {
+    signal?.throwIfAborted();
+    await abortable(this.#sent().then(() => this.#remote.call("settled")), signal);
   }
 
   /** Resolves when the worker has all that was set. */
@@ -309,11 +342,11 @@ export class Viewer extends withMeshTools(EventTarget) {
   async #read(opened, signal, ready) {
     const { total } = opened;
     const feed = async (chunk) => {
-      const { progress, info } = await this.#remote.call("feed", [chunk], [chunk.buffer]);
+      const { progress, info, scene, dropped } = await this.#remote.call("feed", [chunk], [chunk.buffer]);
       signal.throwIfAborted();
       if (info) {
-        this.#info = info;
-        ready(info);
+        [this.#info, this.#scene] = [info, scene];
+        ready({ info, dropped });
       }
       this.#emit("progress", { ...progress, total });
     };
@@ -326,14 +359,30 @@ export class Viewer extends withMeshTools(EventTarget) {
 
   /**
    * Requests another mesh; while the file streams in, and with `view` while the camera moves, the mesh follows this
-   * request. Resolves when the mesh has been made; calls that were replaced meanwhile, with the later one.
+   * request. Resolves when the mesh has been made; calls that were replaced meanwhile, with the later one. The end of the signal
+   * gives the request up: the one before it holds again.
+   *
+   * @param {object} [options]
+   * @param {{ signal?: AbortSignal }} [how]
    */
-  async refine(options = {}) {
+  async refine(options = {}, { signal, ...others } = {}) {
+    checkNames(others, [], ["signal"]);
+    signal?.throwIfAborted();
     const goal = await this.#setRequest.call(sendable(options, true));
     this.#requested?.();
     const waiting = { goal, ...deferred() };
     this.#waiting.push(waiting);
-    return waiting.promise;
+    if (!signal) return waiting.promise;
+    return abortable(waiting.promise, signal).catch((error) => {
+      if (signal.aborted) this.#giveUp(waiting);
+      throw error;
+    });
+  }
+
+  /** Others may wait for the same mesh. */
+  #giveUp(waiting) {
+    this.#waiting = this.#waiting.filter((other) => other !== waiting);
+    if (!this.#waiting.some(({ goal }) => goal === waiting.goal)) this.#remote.call("abandon", [waiting.goal]).catch(() => {});
   }
 
   /** Keeps a copy of the mesh as it is, which `compare` shows beside later ones. */
@@ -356,16 +405,17 @@ export class Viewer extends withMeshTools(EventTarget) {
    *
    * @param {Record<string, any>} changes
    */
-  async set({ camera, ...changes } = {}) {
-    const before = this.#scene;
-    const all = Object.entries({ ...before, ...sendable(changes, true) });
-    const scene = Object.fromEntries(all.filter(([, value]) => value !== null && value !== undefined));
-    this.#scene = scene;
+  async set({ camera, ...given } = {}) {
+    const changes = sendable(given, true);
+    const id = this.#sets++;
+    this.#changes.set(id, changes);
     try {
-      await this.#change(camera ? { scene, camera } : { scene });
-    } catch (error) {
-      if (this.#scene === scene) this.#scene = before;
-      throw error;
+      // What is wrong in one call is no reason to refuse another one that was sent with it.
+      const { scene, refused } = await this.#change({ sets: [{ id, changes, camera }] });
+      this.#scene = scene;
+      if (refused[id]) throw reviveError(refused[id]);
+    } finally {
+      this.#changes.delete(id);
     }
   }
 
@@ -417,13 +467,14 @@ export class Viewer extends withMeshTools(EventTarget) {
   /**
    * A picture of what is drawn, as a PNG; the canvas keeps its own.
    *
-   * @param {{ width?: number, height?: number, samples?: number, background?: string }} [options]
+   * @param {{ width?: number, height?: number, samples?: number, background?: string, signal?: AbortSignal }} [options]
    */
-  screenshot({ width = this.#size[0], height = this.#size[1], samples = 16, background } = {}) {
+  async screenshot({ width = this.#size[0], height = this.#size[1], samples = 16, background, signal } = {}) {
     for (const [name, value] of Object.entries({ width, height, samples })) {
-      if (!(Number.isInteger(value) && value > 0)) return Promise.reject(badOption(name, "must be a positive integer"));
+      if (!(Number.isInteger(value) && value > 0)) throw badOption(name, "must be a positive integer");
     }
-    return this.#remote.call("screenshot", [width, height, samples, background]);
+    signal?.throwIfAborted();
+    return abortable(this.#remote.call("screenshot", [width, height, samples, background]), signal);
   }
 
   /** The handle of the region at a point (−1 to 1, y upwards), or −1. */
@@ -448,8 +499,10 @@ export class Viewer extends withMeshTools(EventTarget) {
     return this.#remote.call("blockMap");
   }
 
-  /** Ends the worker. The canvas keeps its last picture and cannot be used again. */
+  /** Ends the worker. Another viewer can be made of the canvas. */
   free() {
+    this.#cover?.remove();
+    if (holders.get(this.#canvas) === this) holders.set(this.#canvas, undefined);
     this.#stream?.abort(new DOMException("the viewer was freed", "AbortError"));
     this.#observer?.disconnect();
     const freed = new TetralodError("freed", "the viewer was freed");
@@ -479,6 +532,15 @@ function handOver(canvas) {
   } catch (error) {
     throw new TetralodError("bad-option", USED_CANVAS, { cause: error });
   }
+}
+
+/** A canvas that covers another one, and lets the pointer through. */
+function coverOf(canvas) {
+  const cover = document.createElement("canvas");
+  // Not as an attribute, which a Content-Security-Policy forbids.
+  cover.style.cssText = coverStyle(canvas);
+  cover.ariaHidden = "true";
+  return cover;
 }
 
 /** The style of a canvas that covers another one. */

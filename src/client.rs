@@ -191,6 +191,11 @@ impl<S: RangeSource> Client<S> {
         self.remote.fetched()
     }
 
+    /// Bytes of the file that have come, each counted once: never more than it has.
+    pub fn arrived(&self) -> u64 {
+        self.remote.arrived()
+    }
+
     /// The size of the file, once it is known.
     pub fn total(&self) -> Option<u64> {
         self.source.total()

@@ -14,7 +14,7 @@ mod fit;
 pub use angles::CellAngles;
 pub use fit::{Differences, Fit, fit};
 
-use crate::geom::{Bounds, PointGrid, TriangleGrid, weights_at, weights_on_triangle};
+use crate::geom::{Bounds, PointGrid, TetPlaces, TriangleGrid, weights_on_triangle};
 use crate::mesh::boundary_faces;
 use crate::mt::{CurrentMesh, FieldInfo, MtInfo};
 use glam::DVec3;
@@ -158,10 +158,11 @@ impl Measure<'_> {
         let values = self.values(tet);
         let spans = self.spans(values);
         let [origin, step] = [self.info.lattice.origin, self.info.lattice.step].map(DVec3::from);
+        let tet = TetPlaces::new(corners);
         grid.near_tet(&corners, |i| {
             let point = &mut points[i as usize];
             let place = (point.place - origin) / step;
-            let Some(weights) = weights_at(corners, grid.points()[i as usize], place) else { return };
+            let Some(weights) = tet.weights(grid.points()[i as usize], place) else { return };
             point.inside = true;
             if spans {
                 point.compare(weights.iter().zip(values).map(|(w, v)| w * v).sum(), 0.0);

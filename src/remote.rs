@@ -37,6 +37,8 @@ pub struct Remote {
     /// What has been asked for and has not come.
     asked: Vec<Range<u64>>,
     fetched: u64,
+    /// What has come, in ascending order; no two of these meet.
+    arrived: Vec<Range<u64>>,
 }
 
 impl Remote {
@@ -68,6 +70,25 @@ impl Remote {
     /// Bytes of the file that have come, those that came again counted again.
     pub fn fetched(&self) -> u64 {
         self.fetched
+    }
+
+    /// Bytes of the file that have come, each counted once: never more than it has.
+    pub fn arrived(&self) -> u64 {
+        self.arrived.iter().map(|range| range.end - range.start).sum()
+    }
+
+    /// Notes that so many bytes have come from `start` on.
+    fn arrive(&mut self, start: u64, bytes: usize) {
+        if bytes == 0 {
+            return;
+        }
+        self.fetched += bytes as u64;
+        let new = start..start.saturating_add(bytes as u64);
+        let first = self.arrived.partition_point(|range| range.end < new.start);
+        let behind = self.arrived.partition_point(|range| range.start <= new.end);
+        let meets = self.arrived[first..behind].iter();
+        let whole = meets.fold(new, |whole, range| whole.start.min(range.start)..whole.end.max(range.end));
+        self.arrived.splice(first..behind, [whole]);
     }
 
     /// Sets the request, for [`Remote::step`] to make its mesh: see [`Session::request_with`].
@@ -108,7 +129,7 @@ impl Remote {
     /// If the bytes are damaged, or end where more is needed. What was there before stays usable.
     pub fn take(&mut self, range: &Range<u64>, bytes: &[u8]) -> Result<(), FormatError> {
         self.asked.retain(|asked| asked != range);
-        self.fetched += bytes.len() as u64;
+        self.arrive(range.start, bytes.len());
         self.session.take(range.start, bytes)?;
         let is_short = (bytes.len() as u64) < range.end - range.start;
         // At the end of a sound file nothing more is wanted.
@@ -123,7 +144,9 @@ impl Remote {
     /// # Errors
     /// As [`Session::take_exact`].
     pub fn take_exact(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
-        self.fetched += bytes.len() as u64;
+        if let Some(range) = self.session.exact_range() {
+            self.arrive(range.start, bytes.len());
+        }
         self.session.take_exact(bytes)
     }
 
@@ -145,5 +168,22 @@ impl Remote {
                 return Ok(any);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_that_come_again_are_counted_once() {
+        let mut remote = Remote::default();
+        for (start, bytes, arrived) in
+            [(10, 5, 5), (0, 2, 7), (12, 8, 12), (2, 8, 20), (0, 20, 20), (30, 0, 20), (29, 3, 23)]
+        {
+            remote.arrive(start, bytes);
+            assert_eq!(remote.arrived(), arrived, "{start} {bytes}");
+        }
+        assert_eq!(remote.fetched(), 46);
     }
 }

@@ -16,6 +16,49 @@ export function place([at, height]) {
   return [Number(x.toFixed(2)), Number(y.toFixed(2))];
 }
 
+/**
+ * A histogram over one range as one over a larger range, with as many bins: volumes are even within a bin.
+ *
+ * @param {ArrayLike<number>} volumes
+ * @param {[low: number, high: number]} from
+ * @param {[low: number, high: number]} to
+ */
+export function rebinned(volumes, [low, high], [least, most]) {
+  const count = volumes.length;
+  const made = new Float64Array(count);
+  const bin = (value) => (most > least ? ((value - least) / (most - least)) * count : 0);
+  Array.from(volumes).forEach((volume, i) => {
+    const [start, end] = [i, i + 1].map((edge) => bin(low + (edge / count) * (high - low)));
+    const first = Math.min(Math.floor(start), count - 1);
+    const last = Math.min(Math.max(Math.ceil(end) - 1, first), count - 1);
+    for (let j = first; j <= last; j++) {
+      const part = end > start ? (Math.min(end, j + 1) - Math.max(start, j)) / (end - start) : 1;
+      made[j] += volume * (first === last ? 1 : Math.max(part, 0));
+    }
+  });
+  return made;
+}
+
+/**
+ * The values below which some fractions of the sum of a histogram lie.
+ *
+ * @param {ArrayLike<number>} volumes
+ * @param {[low: number, high: number]} range
+ * @param {number[]} fractions
+ */
+export function percentilesOf(volumes, [low, high], fractions) {
+  const all = Array.from(volumes);
+  const total = all.reduce((sum, volume) => sum + volume, 0);
+  let sum = 0;
+  const before = all.map((volume) => (sum += volume) - volume);
+  return fractions.map((fraction) => {
+    const wanted = fraction * total;
+    const i = all.findIndex((volume, at) => before[at] + volume >= wanted);
+    const place = i < 0 ? all.length : i + (all[i] > 0 ? (wanted - before[i]) / all[i] : 0);
+    return low + (place / all.length) * (high - low);
+  });
+}
+
 /** Whether heights are logarithms. @param {ArrayLike<number>} volumes */
 export function isLogarithmic(volumes) {
   const all = Array.from(volumes).filter((volume) => volume > 0);

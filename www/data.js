@@ -82,7 +82,7 @@ function show() {
 
 /** The bytes that the index of the file states for meshes of the whole volume. @returns {{ bytes: number, error: number }[]} */
 function stated() {
-  const { curve, min, max } = page.field ?? {};
+  const { curve, min, max } = page.field?.own ?? {};
   if (!curve) return [];
   return Array.from(curve.errors, (error, i) => ({ error: error / (max - min || 1), bytes: curve.bytes[i] }));
 }

@@ -24,10 +24,10 @@ export function text(output, words, slider) {
 
 let waiting;
 
-/** Announces words to screen readers when they have not changed for a while. */
-export function announce(words) {
+/** Announces words to screen readers when they have not changed for a while (in ms). */
+export function announce(words, rest = 800) {
   clearTimeout(waiting);
-  waiting = setTimeout(() => ($("status").textContent = words), 800);
+  waiting = setTimeout(() => ($("status").textContent = words), rest);
 }
 
 /** Dialogs close with their button, and by a press beside them. */

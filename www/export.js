@@ -8,10 +8,10 @@ import { compose } from "./compose.js";
 import { showIdle } from "./idle.js";
 import { volumeName } from "./opening.js";
 import { placeOfPlane, plane, span } from "./planes.js";
-import { isovalue } from "./scene.js";
+import { draw, isovalue } from "./scene.js";
 import { note } from "./share.js";
 import { onTab } from "./tabs.js";
-import { csv, glb, ply, stl, vtk, vtu } from "./writers.js";
+import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "./writers.js";
 
 /** @typedef {import("./writers.js").Triangles} Triangles */
 
@@ -35,6 +35,32 @@ async function triangles() {
   const { normal, offset } = plane();
   const surface = kind === "slice" ? await viewer.slice(normal, offset) : await viewer.surface();
   return { ...surface, name: field.name };
+}
+
+/** How long the colours of the field are waited for (in ms). */
+const PATIENCE = 5000;
+
+/** The colours of the field that is shown; nothing where they cannot be had. @returns {Promise<import("tetralod/viewer").Legend | undefined>} */
+async function legend() {
+  const { viewer, field } = page;
+  if (viewer.legend?.label === field.name) return viewer.legend;
+  const heard = new Promise((resolve) => {
+    viewer.addEventListener("legend", ({ detail }) => resolve(detail), { once: true });
+    setTimeout(resolve, PATIENCE);
+  });
+  // A section outside of the model brings the colours of the field into the picture, and nothing else.
+  const { high, low } = span();
+  const outside = { ...plane(), offset: Math.max(Math.abs(high), Math.abs(low)) * 2 + (high - low) };
+  await viewer.set({ slices: [...(viewer.state.slices ?? []), outside] });
+  const found = /** @type {import("tetralod/viewer").Legend | undefined} */ (await heard);
+  draw();
+  return found?.label === field.name ? found : undefined;
+}
+
+/** The triangles that are chosen, with the colours that their values have. */
+async function coloured() {
+  const [surface, colours] = [await triangles(), await legend()];
+  return colours ? { ...surface, colours: coloursOf(surface, colours) } : surface;
 }
 
 /** The values at the probes, and along the line between two of them. */
@@ -62,7 +88,7 @@ const MAKERS = {
   vtk: async () => [vtk(await page.viewer.mesh(), page.field.name), "application/octet-stream"],
   stl: async () => [stl(await triangles()), "model/stl"],
   ply: async () => [ply(await triangles()), "application/octet-stream"],
-  glb: async () => [glb(await triangles()), "model/gltf-binary"],
+  glb: async () => [glb(await coloured()), "model/gltf-binary"],
   csv: async () => [await probes(), "text/csv"],
 };
 

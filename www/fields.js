@@ -1,5 +1,6 @@
 /** Which field is shown, at which time, and the time steps that follow each other by themselves. */
 
+import { percentilesOf, rebinned } from "./bins.js";
 import { $, text } from "./dom.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
@@ -26,14 +27,35 @@ export function setFields(all) {
   $("time").value = 0;
 }
 
+/** The smallest and the largest value of a field at all of its times. @param {string} name @returns {[number, number]} */
+export function rangeOf(name) {
+  const steps = demo.info.fields.filter((field) => field.name === name);
+  return [Math.min(...steps.map(({ min }) => min)), Math.max(...steps.map(({ max }) => max))];
+}
+
+/** A field of the file, as the page shows it. @param {number} number @returns {import("./page.js").ShownField} */
+function shownField(number) {
+  const own = demo.info.fields[number];
+  const [min, max] = rangeOf(own.name);
+  const histogram = own.histogram && /** @type {any} */ (rebinned(own.histogram, [own.min, own.max], [min, max]));
+  return { ...own, min, max, histogram, number, own };
+}
+
+/** The values below which some fractions of the volume lie, at all times together; undefined where the file has no histograms. */
+export function percentilesAtAllTimes(fractions) {
+  const steps = (fields.get(page.field.name) ?? []).map((number) => shownField(number).histogram);
+  if (!steps.every(Boolean)) return undefined;
+  const sums = steps.reduce((sum, histogram) => sum.map((volume, i) => volume + histogram[i]));
+  return percentilesOf(sums, [page.field.min, page.field.max], fractions);
+}
+
 /** Reads the field and the time step from the settings. */
 export function chooseField() {
   const steps = fields.get($("field").value);
   $("time").max = steps.length - 1;
   $("time-row").hidden = steps.length < 2;
   if ($("time").value >= steps.length) $("time").value = 0;
-  const field = demo.info.fields[steps[$("time").value]];
-  page.field = field;
+  const field = (page.field = shownField(steps[$("time").value]));
   page.transfer.field = field;
   page.colours.setField(field).catch(fail);
   if (field.time !== undefined) text("time-text", String(Number(field.time.toPrecision(6))), "time");
@@ -44,7 +66,7 @@ export function chooseField() {
 export function followingStep() {
   if (!playing) return undefined;
   const steps = fields.get(page.field.name);
-  return steps[(steps.indexOf(demo.info.fields.indexOf(page.field)) + 1) % steps.length];
+  return steps[(steps.indexOf(page.field.number) + 1) % steps.length];
 }
 
 export const isPlaying = () => playing;

@@ -66,12 +66,13 @@ export class FlowSettings {
     return this.#fields.find(({ name }) => name === component)?.unit ?? "";
   }
 
-  /** A click at a point of the canvas: one more seed on the plane. */
+  /** A click at a point of the canvas: one more seed on the plane; whether there is one. */
   click(point, { axis, at }) {
     const found = this.#overlay.onPlane(point, axis, at);
-    if (!found) return;
+    if (!found) return false;
     this.#seeds = [...this.#seeds, /** @type {Point} */ (found.map((x) => Number(x.toPrecision(DIGITS))))];
     this.#onChange();
+    return true;
   }
 
   /** The plane of the seeds, with those that were clicked, for the overlay. */

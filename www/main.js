@@ -3,11 +3,11 @@
 import { ColourSettings } from "./colours.js";
 import { Comparison } from "./compare.js";
 import { attachControls } from "./controls.js";
-import { $, attachDialogs } from "./dom.js";
+import { $, announce, attachDialogs } from "./dom.js";
 import { attachData, record } from "./data.js";
 import { attachEmpty } from "./empty.js";
 import { attachExport } from "./export.js";
-import { attachFields } from "./fields.js";
+import { attachFields, percentilesAtAllTimes } from "./fields.js";
 import { attachFiles } from "./files.js";
 import { FlowSettings } from "./flow.js";
 import { attachGallery, openGallery, readVolumes, sceneOf, shown, showPoster } from "./gallery.js";
@@ -150,7 +150,7 @@ function attachOverlay(viewer) {
   const plot = { plot: $("plot"), plotTitle: $("plot-title"), plotArea: $("plot-area") };
   const stage = { ...parts, ...plot };
   const svg = $("overlay");
-  const probes = new Probes({ viewer, overlay, svg, stage, fields: () => demo.info.fields, shown: () => page.field });
+  const probes = new Probes({ viewer, overlay, svg, stage, fields: () => demo.info?.fields, shown: () => page.field });
   Object.assign(page, { overlay, probes });
   $("unpin").addEventListener("click", () => probes.clear());
   $("box-of-pins").addEventListener("click", () => {
@@ -163,7 +163,8 @@ function attachOverlay(viewer) {
 function attachColours(viewer) {
   const parts = { map: $("map"), reversed: $("reversed"), log: $("log"), preset: $("range-preset") };
   const range = { low: $("range-low"), high: $("range-high"), note: $("range-note") };
-  const percentiles = async (fractions) => Array.from((await viewer.stats({ bins: 1000, fractions })).percentiles);
+  const percentiles = async (fractions) =>
+    percentilesAtAllTimes(fractions) ?? Array.from((await viewer.stats({ bins: 1000, fractions })).percentiles);
   page.colours = new ColourSettings({ ...parts, ...range }, { percentiles, onChange: draw });
   const ends = { low: $("transfer-low"), high: $("transfer-high"), chosen: $("transfer-chosen"), bar: $("transfer-bar") };
   const buttons = { preset: $("transfer-preset"), add: $("transfer-add"), remove: $("transfer-remove") };
@@ -173,12 +174,19 @@ function attachColours(viewer) {
   );
 }
 
-/** A click on the picture: a seed of a streamline on the plane in the view of the flow, a probe in all others. */
+/** A click on the picture, or its key: a seed of a streamline on the plane in the view of the flow, a probe in all others. */
 async function clicked(point) {
   if (!demo.info) return;
-  if (mode() === "flow") page.flow.click(point, seedPlane());
-  else page.probes.pin(point).catch(fail);
+  try {
+    announce(await (mode() === "flow" ? addSeed(point) : addProbe(point)), 0);
+  } catch (error) {
+    fail(error);
+  }
 }
+
+const addSeed = (point) => (page.flow.click(point, seedPlane()) ? "One more seed on the plane" : "The plane of the seeds is not there");
+
+const addProbe = async (point) => ((await page.probes.pin(point)) ? page.probes.spoken : "Nothing is shown there");
 
 /** Where the rectangle that is being spanned ends. */
 let spanEnd = { x: 0, y: 0 };

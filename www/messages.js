@@ -4,6 +4,7 @@ import { $ } from "./dom.js";
 import { demo } from "./page.js";
 
 const TITLES = {
+  "no-file": "This file is not part of the link",
   network: "The file could not be downloaded",
   cors: "The server does not allow this page to read the file",
   server: "The server does not send the bytes of the file",
@@ -24,6 +25,7 @@ export function fail(error) {
   demo.state = "failed";
   $("loading").classList.add("done");
   $("retry").hidden = !(PASSING.includes(error.code) && isElsewhere() && !(LASTING.test(error.message) && isOpening()));
+  $("choose-file").hidden = error.code !== "no-file";
   // Nothing has come yet: what was said of the opening is over.
   if (!demo.info) $("growth").textContent = "";
   say(TITLES[error.code] ?? "The file could not be opened", error);
@@ -50,6 +52,7 @@ export function attachMessages({ onRetry, isRemote, isNew }) {
   isElsewhere = isRemote;
   isOpening = isNew;
   $("dismiss").addEventListener("click", hideMessage);
+  $("choose-file").addEventListener("click", () => $("file").click());
   $("retry").addEventListener("click", onRetry);
 }
 

@@ -25,6 +25,8 @@ let opening = 0;
 let first = "";
 /** Files of the user, by their names: undo may come back to them. @type {Map<string, File>} */
 const files = new Map();
+/** The file that a link is of, which contains none: until it is dropped, and how it is shown then. @type {{ name: string, words?: Record<string, string> } | undefined} */
+let awaited;
 const FILE = "file:";
 
 /** What MT files were built of by the page: in words, and its bytes. @type {WeakMap<File, { format: string, bytes: number }>} */
@@ -77,12 +79,11 @@ function sourceOf(words) {
 export async function open(wanted, words) {
   if (wanted instanceof File) files.set(wanted.name, wanted);
   const from = typeof wanted === "string" ? sourceOf(wanted) : wanted;
-  if (!from) {
-    fail({ code: "no-file", message: `The file ${wanted.slice(FILE.length)} is not part of the link. Open it from your disk` });
-    return source ? undefined : open(first);
-  }
+  if (!from) return wait({ name: wanted.slice(FILE.length), words });
   const before = { ...demo, source };
-  const shown = words ?? (demo.info ? carriedOver() : {});
+  const ofLink = from instanceof File && from.name === awaited?.name ? awaited.words : undefined;
+  awaited = undefined;
+  const shown = words ?? ofLink ?? (demo.info ? carriedOver() : {});
   source = tried = from;
   showInList(from);
   const mine = ++opening;
@@ -113,6 +114,14 @@ export async function open(wanted, words) {
     stay(before);
     fail(error);
   }
+}
+
+/** A link is of a file that is not here: says so, and shows it as in the link when it is dropped. */
+function wait(file) {
+  awaited = file;
+  if (!demo.info) showInList(/** @type {any} */ ({ name: file.name }));
+  const words = `The link is of ${file.name}, a file on a disk, which links do not contain. Drop it on the page, or choose it, to see it as in the link`;
+  fail({ code: "no-file", message: words });
 }
 
 /** What could not be opened has not taken the place of the volume before: that stays, with its settings. */

@@ -27,10 +27,17 @@ export const demo = (window.tetralodDemo = {
 });
 
 /**
+ * A field at one of its times. `min` and `max` are over all times, and the histogram is of that range, so that values and colours mean
+ * the same at all of them; `number` is its place in `info.fields`, `own` what that says of it.
+ *
+ * @typedef {import("tetralod").FieldInfo & { number: number, own: import("tetralod").FieldInfo }} ShownField
+ */
+
+/**
  * @type {{ viewer?: import("tetralod/viewer").Viewer, overlay?: import("./overlay.js").OverlayView,
  *   probes?: import("./probes.js").Probes, colours?: import("./colours.js").ColourSettings,
  *   transfer?: import("./transfer.js").TransferEditor, flow?: import("./flow.js").FlowSettings,
- *   comparison?: import("./compare.js").Comparison, field?: import("tetralod").FieldInfo,
+ *   comparison?: import("./compare.js").Comparison, field?: ShownField,
  *   isovalue?: number, box?: number[] }}
  */
 export const page = {

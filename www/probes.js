@@ -48,7 +48,7 @@ export class Probes {
   /**
    * @param {{ viewer: import("tetralod/viewer").Viewer, overlay: import("./overlay.js").OverlayView, svg: SVGSVGElement,
    *   stage: Record<"readout" | "cards" | "plot" | "plotTitle" | "plotArea" | "marquee", any>,
-   *   fields: () => import("tetralod").FieldInfo[], shown: () => import("tetralod").FieldInfo }} parts
+   *   fields: () => import("tetralod").FieldInfo[] | undefined, shown: () => import("tetralod").FieldInfo }} parts
    */
   constructor({ viewer, overlay, svg, stage, fields, shown }) {
     this.#viewer = viewer;
@@ -78,7 +78,7 @@ export class Probes {
     if (points.length === 0) return;
     this.#coming = words;
     Promise.all(points.map((point) => this.#viewer.reading(point))).then(
-      (found) => this.#pins === mine && this.#setPins(found.filter(Boolean)),
+      (found) => this.#pins === mine && this.#fields() && this.#setPins(found.filter(Boolean)),
       () => {},
     );
   }
@@ -92,7 +92,7 @@ export class Probes {
       const start = performance.now();
       const found = await this.#viewer.pick(...point).catch(() => undefined);
       this.#took = performance.now() - start;
-      if (mine === this.#asked) this.#readOut(found, place);
+      if (mine === this.#asked && this.#fields()) this.#readOut(found, place);
     };
     if (this.#took < QUICK) ask();
     else this.#resting = setTimeout(ask, REST);
@@ -108,8 +108,17 @@ export class Probes {
   /** Keeps the point that is shown at a point of the canvas. */
   async pin(point) {
     const found = await this.#viewer.pick(...point);
+    if (!this.#fields()) return undefined;
     if (found) this.#setPins([...this.#pins, found].slice(-MOST_PINS));
     return found;
+  }
+
+  /** What the last probe has found, in a sentence. */
+  get spoken() {
+    const list = this.#stage.cards.lastElementChild?.querySelector("dl");
+    if (!list) return "";
+    const terms = [...list.querySelectorAll("dt")].map((term) => `${term.textContent} ${term.nextElementSibling.textContent}`);
+    return `Probe ${NAMES[this.#pins.length - 1]}: ${terms.join("; ")}`;
   }
 
   clear() {
@@ -120,9 +129,10 @@ export class Probes {
   async refresh() {
     if (this.#hovered) this.hover(...this.#hovered);
     const before = this.#pins;
-    if (before.length === 0) return;
+    // While another volume is being opened, nothing is known of what is read.
+    if (before.length === 0 || !this.#fields()) return;
     const read = await Promise.all(before.map(({ position }) => this.#viewer.reading(position).catch(() => undefined)));
-    if (before === this.#pins) this.#setPins(read.map((found, i) => found ?? before[i]));
+    if (before === this.#pins && this.#fields()) this.#setPins(read.map((found, i) => found ?? before[i]));
   }
 
   /** The box between the points that are shown at two points of the canvas. @returns {Promise<number[] | undefined>} */
@@ -182,7 +192,7 @@ export class Probes {
       [term.textContent, description.textContent] = [name, value];
       list.append(term, description);
     };
-    const byName = new Map([this.#shown(), ...this.#fields()].map((field) => [field.name, field]));
+    const byName = new Map([this.#shown(), ...(this.#fields() ?? [])].map((field) => [field.name, field]));
     const fields = [...byName.values()];
     for (const field of fields.slice(0, MOST_FIELDS)) {
       add(field.name, `${rounded(values[field.name], field.max - field.min)} ${field.unit}`.trim());
@@ -240,9 +250,11 @@ export class Probes {
       const wantsRight = other ? x >= other[0] : true;
       const fitsRight = x + 16 + card.offsetWidth < stage.clientWidth;
       const fitsLeft = x - 16 - card.offsetWidth > 0;
-      const left = (wantsRight && fitsRight) || !fitsLeft ? x + 16 : x - 16 - card.offsetWidth;
       const [width, height] = [card.offsetWidth, card.offsetHeight];
-      const held = (top) => Math.min(Math.max(top, 4), stage.clientHeight - height - 4);
+      const wanted = (wantsRight && fitsRight) || !fitsLeft ? x + 16 : x - 16 - width;
+      // Where neither side has room, as on a phone, it lies over the probe.
+      const left = Math.max(Math.min(wanted, stage.clientWidth - width - 4), 4);
+      const held = (top) => Math.max(Math.min(top, stage.clientHeight - height - 4), 4);
       let top = held(y - height / 2);
       if (last && left < last.left + last.width && last.left < left + width && Math.abs(top - last.top) < height) {
         // Below the card before, or above it where there is more room.

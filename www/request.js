@@ -40,7 +40,7 @@ export function refine() {
   text("error-text", percent === 0 ? "0 (full resolution)" : percentage(percent), "error");
   text("budget-text", budget() === undefined ? "no limit" : `${count(budget())}`, "budget");
   text("pixels-text", pixels(errorPixels()), "pixels");
-  const field = demo.info.fields.indexOf(page.field);
+  const field = page.field.number;
   /** @type {import("tetralod/viewer").ViewerRefineOptions} */
   const options = { error: `${percent}%`, field, maxTets: budget(), .../** @type {any} */ (region()) };
   if ($("focus").checked) options.isovalues = [isovalue()];

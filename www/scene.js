@@ -1,6 +1,7 @@
 /** What is drawn: the view, the isovalue, the plane, colours, and the colour bar. */
 
 import { $, text } from "./dom.js";
+import { rangeOf } from "./fields.js";
 import { rounded } from "./format.js";
 import { expectFrame } from "./empty.js";
 import { showHistogramLine, showVolumes } from "./histogram.js";
@@ -64,9 +65,10 @@ export function applyMode() {
 
 /** Shows the histogram of the field where the isovalue and the transfer function are chosen. */
 export async function showHistogram() {
-  if (!["iso", "volume"].includes(mode()) || !demo.info) return;
+  if (!["iso", "volume"].includes(mode()) || !demo.info || !page.field) return;
   // That of the file is of the reference mesh; without it, that of the mesh which is shown.
-  const histogram = page.field?.histogram ?? (await page.viewer.stats({ bins: 100 })).histogram;
+  const { min, max, histogram: known } = page.field;
+  const histogram = known ?? (await page.viewer.stats({ bins: 100, range: [min, max] })).histogram;
   page.transfer.volumes = histogram;
   showVolumes(histogram);
 }
@@ -138,7 +140,7 @@ export function draw() {
 
 /** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. */
 function ownRange(name) {
-  const { min, max } = demo.info.fields.find((field) => field.name === name);
+  const [min, max] = rangeOf(name);
   const most = Math.max(-min, max);
   return min < 0 && max > 0 ? [-most, most] : [min, max];
 }

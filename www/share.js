@@ -4,8 +4,9 @@ import { $ } from "./dom.js";
 import { sourceWords } from "./opening.js";
 import { save } from "./state.js";
 
-/** How long a note stays (in ms). */
+/** How long a note stays (in ms); longer ones stay longer. */
 const NOTE = 4000;
+const A_LETTER = 100;
 
 let timer;
 
@@ -21,7 +22,7 @@ export function note(words, action) {
   $("note").replaceChildren(words);
   $("note").hidden = false;
   if (!action) {
-    timer = setTimeout(hide, NOTE);
+    timer = setTimeout(hide, Math.max(NOTE, A_LETTER * words.length));
     return;
   }
   const close = { label: "Close", act: () => {} };
@@ -43,7 +44,7 @@ export async function share() {
   const isFile = sourceWords().startsWith("file:");
   try {
     await navigator.clipboard.writeText(location.href);
-    note(isFile ? "Link copied. It does not contain your file" : "Link copied");
+    note(isFile ? "Link copied. It does not contain your file, and asks for it" : "Link copied");
   } catch {
     note("The browser does not let this page copy: the link is in the address bar");
   }

@@ -5,7 +5,8 @@
  */
 
 import { $, all, checked } from "./dom.js";
-import { chooseField, isPlaying } from "./fields.js";
+import { chooseField, isPlaying, rangeOf } from "./fields.js";
+import { rounded } from "./format.js";
 import { fail } from "./messages.js";
 import { open, sourceWords } from "./opening.js";
 import { demo, page } from "./page.js";
@@ -14,6 +15,7 @@ import { words as ofPlanes } from "./planes.js";
 import { applyRegion, inner } from "./region.js";
 import { applyFrameTime, applyRefineBy, errorPositions } from "./request.js";
 import { applyMode } from "./scene.js";
+import { note } from "./share.js";
 import { applyTheme } from "./theme.js";
 
 /** The state is written when nothing has changed for so long (in ms). */
@@ -164,10 +166,80 @@ export function carriedOver() {
   return rest;
 }
 
-/** A volume has arrived: shows it with these words, or as it is by default. @param {Words} words */
+/** Points of the model that are inside of the volume. @param {string} words */
+function inside(words) {
+  const { bounds } = demo.info;
+  const all = numbers(words);
+  const points = all.flatMap((_, i) => (i % 3 === 0 && i + 2 < all.length ? [all.slice(i, i + 3)] : []));
+  return points.filter((point) => point.every((x, i) => x >= bounds[i] && x <= bounds[i + 3]));
+}
+
+/**
+ * What words mean of the volume that has arrived, where that is not all that they say, and what is not there; nothing where all is.
+ *
+ * @type {Record<string, (words: string, field: string) => [kept: string, lost: string] | undefined>}
+ */
+const LIMITS = {
+  isovalue: (words, field) => {
+    const [low, high] = rangeOf(field);
+    const isThere = !isNumbers(words, 1) || (Number(words) >= low && Number(words) <= high);
+    return isThere ? undefined : ["", `isovalue ${words} (${field} is ${rangeWords(low, high)})`];
+  },
+  range: (words, field) => {
+    const [low, high] = rangeOf(field);
+    const [from, to] = numbers(words);
+    return !isNumbers(words, 2) || (to >= low && from <= high) ? undefined : ["", `colours of ${rangeWords(from, to)} (${field} is ${rangeWords(low, high)})`];
+  },
+  box: (words) => {
+    const { bounds } = demo.info;
+    const box = numbers(words);
+    const meets = [0, 1, 2].every((i) => box[i] <= bounds[i + 3] && box[i + 3] >= bounds[i]);
+    return !isNumbers(words, 6) || meets ? undefined : ["", "the box of the region"];
+  },
+  seeds: (words) => pointsLeft(words, "seeds"),
+  probes: (words) => pointsLeft(words, "probes"),
+};
+
+const rangeWords = (low, high) => `${rounded(low, high - low)} to ${rounded(high, high - low)}`;
+
+/** @returns {[kept: string, lost: string] | undefined} */
+function pointsLeft(words, what) {
+  const left = inside(words);
+  const count = Math.floor(numbers(words).length / 3) - left.length;
+  return count > 0 ? [String(left.flat()), `${count} ${what} outside`] : undefined;
+}
+
+/** The words of which the volume has something, and what it has not. @param {Words} words @returns {[kept: Words, lost: string[]]} */
+function fitting(words) {
+  const field = [...$("field").options].some(({ value }) => value === words.field) ? words.field : demo.info.fields[0].name;
+  const [kept, lost] = [{ ...words }, /** @type {string[]} */ ([])];
+  for (const [name, judge] of Object.entries(LIMITS)) {
+    const [left, what] = (words[name] && judge(words[name], field)) || [];
+    if (what === undefined) continue;
+    kept[name] = left;
+    lost.push(what);
+  }
+  return [kept, lost];
+}
+
+/** What of some words no control has taken. @param {Words} words */
+function untaken(words) {
+  const isNot = (id) => words[id] && $(id).value !== words[id];
+  const label = (name, value) => document.querySelector(`[name=${name}][value="${value}"]`)?.parentElement.textContent.trim() ?? value;
+  const lists = { field: "field", "surface-colour": "colours of", vector: "vector", time: "time step" };
+  const lost = Object.entries(lists).flatMap(([id, what]) => (isNot(id) ? [`${what} ${words[id]}`] : []));
+  if (words.view && words.view !== checked("mode")) lost.push(`view ${label("mode", words.view)}`);
+  const off = (words.also ?? "").split(",").filter((name) => document.querySelector(`[name=also][value="${CSS.escape(name)}"]:disabled`));
+  return [...lost, ...off.map((name) => `${label("also", name)} beside the view`)];
+}
+
+/** A volume has arrived: shows it with these words, or as it is by default; says what of them it does not have. @param {Words} words */
 export function arriveWith(words) {
   home = page.viewer.state.camera;
-  show(words);
+  const [kept, lost] = fitting(words);
+  show(kept);
+  lost.push(...untaken(words));
+  if (lost.length > 0) note(`Left out, since this volume does not have it: ${lost.join(", ")}`);
   // What is changed first can be undone, too, however soon.
   if (now === undefined) save();
   // The address names the volume even if all events of its camera came before it was open.

@@ -2,7 +2,10 @@
 
 /** @typedef {{ origin: number[], offset: number, scale: number }} Stored what positions and values are relative to */
 /** @typedef {Stored & { positions: Float32Array, field: Float32Array, tets: Uint32Array }} TetMesh */
-/** @typedef {Stored & { positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array, name: string }} Triangles */
+/**
+ * @typedef {Stored & { positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array, name: string,
+ *   colours?: Float32Array }} Triangles colours are three numbers a vertex: linear light, 0 to 1
+ */
 
 const TETRAHEDRON = 10;
 
@@ -156,7 +159,7 @@ function bounds(positions) {
  *
  * @param {Triangles} surface @returns {BlobPart[]}
  */
-export function glb({ positions, indices, values, normals, origin, offset, scale }) {
+export function glb({ positions, indices, values, normals, colours, origin, offset, scale }) {
   const [FLOAT, UINT, VERTICES, ELEMENTS] = [5126, 5125, 34962, 34963];
   /** @type {[array: Float32Array | Uint32Array, accessor: object, target: number, attribute?: string][]} */
   const all = [
@@ -164,6 +167,7 @@ export function glb({ positions, indices, values, normals, origin, offset, scale
     [positions, { componentType: FLOAT, count: positions.length / 3, type: "VEC3", ...bounds(positions) }, VERTICES, "POSITION"],
   ];
   if (normals) all.push([normals, { componentType: FLOAT, count: normals.length / 3, type: "VEC3" }, VERTICES, "NORMAL"]);
+  if (colours) all.push([colours, { componentType: FLOAT, count: colours.length / 3, type: "VEC3" }, VERTICES, "COLOR_0"]);
   if (values) all.push([values, { componentType: FLOAT, count: values.length, type: "SCALAR" }, VERTICES, "_VALUE"]);
   let length = 0;
   const bufferViews = all.map(([array, , target]) => {
@@ -189,6 +193,31 @@ export function glb({ positions, indices, values, normals, origin, offset, scale
   const [JSON_CHUNK, BIN_CHUNK] = [0x4e4f534a, 0x004e4942];
   const header = Uint32Array.of(0x46546c67, 2, 12 + 8 + padded.length + 8 + length, padded.length, JSON_CHUNK);
   return /** @type {BlobPart[]} */ ([header, padded, Uint32Array.of(length, BIN_CHUNK), ...all.map(([array]) => array)]);
+}
+
+/** The light that a channel of sRGB means, both 0 to 1. */
+const linear = (channel) => (channel <= 0.04045 ? channel / 12.92 : ((channel + 0.055) / 1.055) ** 2.4);
+
+/**
+ * The colours that values have on the scale of a legend, as linear light: what glTF has in `COLOR_0`.
+ *
+ * @param {Stored & { values: Float32Array }} surface
+ * @param {Pick<import("tetralod/viewer").Legend, "range" | "log" | "colours">} legend
+ */
+export function coloursOf({ values, offset, scale }, { range, log, colours }) {
+  const even = (value) => (log ? Math.log(value) : value);
+  const [low, high] = range.map(even);
+  const table = colours.map((colour) => [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16) / 255));
+  const found = new Float32Array(3 * values.length);
+  values.forEach((stored, i) => {
+    const part = high > low ? (even(offset + scale * stored) - low) / (high - low) : 0.5;
+    // Logarithms of what is not positive are at the lower end.
+    const place = Math.min(Math.max(part || 0, 0), 1) * (table.length - 1);
+    const below = Math.min(Math.floor(place), table.length - 2);
+    const mixed = table[below].map((c, k) => linear(c + (table[below + 1][k] - c) * (place - below)));
+    found.set(mixed, 3 * i);
+  });
+  return found;
 }
 
 /** Comma-separated values. Numbers that are missing are empty. @param {(string | number | undefined)[][]} rows @returns {BlobPart[]} */

@@ -396,9 +396,7 @@ impl BuildOptions {
         let is_sound = way != Way::Whole && mesh.grid.is_some();
         let repair = if is_sound { None } else { Repair::of(mesh, self.repair.level(), repaired)? };
         let repaired = repaired.to_string();
-        let notes = mesh.input.lines();
-        let repaired = [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)];
-        for line in notes.iter().chain(repaired.into_iter().flatten()) {
+        for line in [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)].into_iter().flatten() {
             if !line.is_empty() && !verbosity.quiet {
                 eprintln!("{}: {line}", self.name());
             }

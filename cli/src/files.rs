@@ -63,7 +63,10 @@ pub fn check_output<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBu
         bail!("{name} is a folder; give a file in it after -o");
     }
     let Ok(place) = fs::canonicalize(path) else { return Ok(()) };
-    let is_it = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input == place);
+    let is_it = |input: &&PathBuf| {
+        let is_same = |file: &Path| fs::canonicalize(file).is_ok_and(|file| file == place);
+        is_same(input) || is_beside(input, &place) || names(input, &place)
+    };
     // Pipes and devices are not replaced.
     if let Some(input) = inputs.into_iter().find(is_it).filter(|_| found.is_file()) {
         bail!(
@@ -72,6 +75,28 @@ pub fn check_output<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBu
         );
     }
     Ok(())
+}
+
+/// Whether the file at `place` is one that is read with an input of the same name and another ending.
+fn is_beside(input: &Path, place: &Path) -> bool {
+    const TOGETHER: [&[&str]; 3] = [&["raw", "json"], &["mesh", "sol", "meshb", "solb"], &["node", "ele"]];
+    let Ok(input) = fs::canonicalize(input) else { return false };
+    let [a, b] = [input.as_path(), place].map(ending);
+    let are_together =
+        TOGETHER.iter().any(|known| known.contains(&a.as_str()) && known.contains(&b.as_str()));
+    are_together && input.with_extension("") == place.with_extension("")
+}
+
+/// Whether an input that refers to other files, such as a list of pieces, names the file at `place`.
+fn names(input: &Path, place: &Path) -> bool {
+    const LISTS: [&str; 8] = ["pvd", "pvtu", "pvti", "pvtr", "pvts", "mhd", "nhdr", "json"];
+    if !LISTS.contains(&ending(input).as_str()) {
+        return false;
+    }
+    let (Ok(text), Ok(input)) = (fs::read(input), fs::canonicalize(input)) else { return false };
+    let folder = input.parent().unwrap_or(Path::new(""));
+    let Some(name) = place.strip_prefix(folder).ok().and_then(|name| name.to_str()) else { return false };
+    text.windows(name.len().max(1)).any(|window| window == name.as_bytes())
 }
 
 /// The ending of a file's name in lower case, without the dot.
@@ -227,14 +252,14 @@ pub struct Opened {
     pub session: Session,
     /// Of the file.
     pub bytes: u64,
-    /// Those that were read.
+    /// Those that were read, each counted once.
     pub read: u64,
 }
 
 impl Opened {
     /// What a client has.
     pub fn of(client: Client<Bytes>) -> Self {
-        let read = client.fetched();
+        let read = client.arrived();
         Self { bytes: client.total().unwrap_or(read), read, session: client.into_session() }
     }
 

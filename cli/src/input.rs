@@ -81,7 +81,13 @@ pub fn read_cells(
         }
     })?;
     drop(input);
+    say_notes(&mesh, &steps[0].path);
     mend(mesh, level, &steps[0].path)
+}
+
+/// Says what the reader left out of a file.
+fn say_notes(mesh: &TetMesh, path: &Path) {
+    mesh.notes.iter().for_each(|note| eprintln!("note: {}: {note}", name(path)));
 }
 
 /// The time steps in these files.

@@ -4,6 +4,7 @@ use super::output::{self, Verbosity};
 use super::{files, parts};
 use anyhow::{Context, Result};
 use serde::Serialize;
+use std::fs;
 use std::path::PathBuf;
 use tetralod::builder::BuildResult;
 use tetralod::builder::parts::Node;
@@ -45,7 +46,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let output = output.as_ref().context("-o FILE is missing")?;
     files::check_ending(output, "mt")?;
-    files::check_output(output, [])?;
+    // All that is in the folder is read.
+    let parts: Vec<PathBuf> =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+    files::check_output(output, &parts)?;
     let (BuildResult { mt, summary, exact, .. }, plan) = parts::assemble(folder, verbosity)?;
     let options = EncodeOptions {
         block_bits: plan.block_bits(),

@@ -11,15 +11,15 @@ pub struct Verbosity {
     /// No progress bar and no summary.
     #[arg(short, long)]
     pub quiet: bool,
-    /// Print the summary as a JSON object.
-    #[arg(long, conflicts_with = "quiet")]
+    /// Print the summary as a JSON object, also with --quiet.
+    #[arg(long)]
     json: bool,
 }
 
 impl Verbosity {
     /// Prints the summary, if it is wanted.
     pub fn print(&self, report: &impl Serialize, rows: &[(&str, String)]) -> Result<()> {
-        if self.quiet { Ok(()) } else { result(self.json, report, rows) }
+        if self.quiet && !self.json { Ok(()) } else { result(self.json, report, rows) }
     }
 }
 

@@ -53,9 +53,9 @@ struct Report<'a> {
 const LONG: Duration = Duration::from_secs(10);
 /// Percent between two lines of progress.
 const PRINT_EVERY: u64 = 10;
-/// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: two current meshes, the tetrahedra
-/// around each vertex, and what requests are answered with.
-const TET_BYTES: u64 = 140;
+/// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: three current meshes, and what requests are
+/// answered with.
+const TET_BYTES: u64 = 210;
 const VERTEX_BYTES: u64 = 240;
 
 /// About the most memory that a verification takes.
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(count) = arguments.samples {
         return run_samples(arguments, count).with_context(|| arguments.file.display().to_string());
     }
-    let opened = files::open_mt(&arguments.file)?;
+    let mut opened = files::open_mt(&arguments.file)?;
     let reference = opened.reference();
     let input = input::read_reference(&arguments.against, &opened)?;
     let about = memory(opened.mt()?, &input);
@@ -87,11 +87,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             eprintln!("{percent} % ({done} of {total} steps), about {} of memory", output::bytes(about));
         }
     };
-    let report = if arguments.quick {
+    let mut report = if arguments.quick {
         verify::run_sample(opened.mt()?, &input, reference, Sample::default(), &mut on_progress)
     } else {
         verify::run(opened.mt()?, &input, reference, &mut on_progress)
     };
+    report.add(verify::run_shown(&mut opened.session, &input, reference));
     bar.finish_and_clear();
     print(arguments, &report, Took { memory_bytes: Some(about), bytes_read: None })?;
     Ok(if report.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
@@ -127,12 +128,7 @@ fn run_samples(arguments: &Arguments, count: u32) -> Result<ExitCode> {
         client.refine(&sample.request)?;
         read += client.fetched();
         let mt = client.session().mt().context("the MT has no base mesh")?;
-        let report = verify::run_request(mt, &input, sample);
-        whole.valid &= report.valid;
-        whole.queries += report.queries;
-        whole.worst_error_ratio = whole.worst_error_ratio.max(report.worst_error_ratio);
-        whole.failures.extend(report.failures);
-        whole.failures.truncate(verify::MAX_FAILURES);
+        whole.add(verify::run_request(mt, &input, sample));
         bar.inc(1);
     }
     bar.finish_and_clear();

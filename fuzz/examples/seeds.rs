@@ -64,13 +64,21 @@ fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
 }
 
 /// A tetrahedron, or a cube of samples, in formats that are not VTK's.
-const OTHER_FORMATS: [(&str, &str); 6] = [
+const OTHER_FORMATS: [(&str, &str); 10] = [
     ("ascii-2.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n\
         5 4 2 6 2 1 2 3 4\n$EndElements\n$NodeData\n1\n\"T\"\n1\n0\n3\n0\n1\n4\n1 1\n2 2\n3 3\n4 4\n$EndNodeData\n"),
     ("ascii-4.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 2 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n\
         $EndNodes\n$Elements\n1 1 5 5\n3 2 4 1\n5 1 2 3 4\n$EndElements\n"),
     ("a.mesh", "MeshVersionFormatted 1\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n"),
     ("a.vol", "mesh3d\ndimension 3\nvolumeelements\n1\n7 4 1 3 2 4\npoints\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nendmesh\n"),
+    ("list.nrrd", "NRRD0005\ntype: uint8\ndimension: 4\nsizes: 2 2 2 2\nkinds: domain domain domain list\naxis mins: 0 0 0 nan\naxis maxs: 2 4 6 nan\n\
+        encoding: hex\nold min: 1\n\n000102030405060708090a0b0c0d0e0f"),
+    ("text.mha", "NDims = 3\nBinaryData = False\nDimSize = 2 2 2\nElementType = MET_SHORT_ARRAY\nElementDataFile = LOCAL\n1 2 3 4 5 6 7 8"),
+    ("quadratic.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices 10\n0 0 0 0\n2 0 0 0\n0 2 0 0\n0 0 2 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n0 0 1 0\n1 0 1 0\n0 1 1 0\n\
+        TetrahedraP2 1\n1 2 3 4 5 6 7 8 9 10 1\nSolAtVertices 10 1 1\n0 1 2 3 4 5 6 7 8 9\nEnd\n"),
+    ("steps.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n\
+        1 4 2 1 1 1 2 3 4\n$EndElements\n$NodeData\n1\n\"T\"\n1\n0\n3\n0\n1\n4\n1 1\n2 2\n3 3\n4 4\n$EndNodeData\n$NodeData\n1\n\"T\"\n1\n1\n3\n1\n1\n4\n\
+        1 1\n2 2\n3 3\n4 4\n$EndNodeData\n$ElementNodeData\n1\n\"s\"\n1\n0\n3\n0\n1\n1\n1 4 1 2 3 4\n$EndElementNodeData\n"),
     ("a.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\nABCDEFGH"),
     ("a.mha", "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\nABCDEFGH"),
 ];

@@ -36,4 +36,4 @@ pub use triangle::nearest_on_triangle;
 pub(crate) use triangle::weights_on_triangle;
 pub(crate) use triangle_grid::TriangleGrid;
 #[cfg(feature = "build")]
-pub(crate) use weights::{ON_LATTICE, weights_at};
+pub(crate) use weights::{ON_LATTICE, TetPlaces};

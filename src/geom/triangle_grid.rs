@@ -28,22 +28,43 @@ impl TriangleGrid {
         let mut grid = Self { corners, low, side, cells, in_cell: Groups::default() };
         grid.in_cell = Groups::new(cells.iter().product(), |add| {
             for (i, [a, b, c]) in (0..).zip(&grid.corners) {
-                grid.cells_between(a.min(*b).min(*c), a.max(*b).max(*c), |cell| add(cell, i));
+                grid.cells_between(a.min(*b).min(*c), a.max(*b).max(*c), |cell| {
+                    add(cell, i);
+                    false
+                });
             }
         });
         grid
     }
 
-    fn cells_between(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(usize)) {
+    /// Visits the cells between two points until `visit` returns true; whether it did.
+    fn cells_between(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(usize) -> bool) -> bool {
         let along = |x: f64, axis: usize| {
             ((x - self.low[axis]) / self.side).clamp(0.0, (self.cells[axis] - 1) as f64) as usize
         };
         let range = |axis: usize| along(low[axis], axis)..=along(high[axis], axis);
-        for z in range(2) {
-            for y in range(1) {
-                range(0).for_each(|x| visit((z * self.cells[1] + y) * self.cells[0] + x));
-            }
+        range(2)
+            .any(|z| range(1).any(|y| range(0).any(|x| visit((z * self.cells[1] + y) * self.cells[0] + x))))
+    }
+
+    /// Whether one of the triangles comes within `radius` of `p`: one that does, or else none. `first` is tried before all others.
+    #[cfg(feature = "build")]
+    pub fn any_within(&self, p: DVec3, radius: f64, first: u32) -> Option<u32> {
+        let is_near = |i: u32| {
+            let corners = self.corners.get(i as usize);
+            corners.is_some_and(|&corners| p.distance(nearest_on_triangle(p, corners)) <= radius)
+        };
+        if is_near(first) {
+            return Some(first);
         }
+        let (reach, mut found) = (DVec3::splat(radius), None);
+        if !self.corners.is_empty() {
+            self.cells_between(p - reach, p + reach, |cell| {
+                found = self.in_cell.of(cell).iter().copied().find(|&i| is_near(i));
+                found.is_some()
+            });
+        }
+        found
     }
 
     /// Calls `visit` with each triangle that comes within `radius` of `p`, its nearest point and the distance; with
@@ -61,6 +82,7 @@ impl TriangleGrid {
                     visit(i, q, distance);
                 }
             }
+            false
         });
     }
 

@@ -1,4 +1,4 @@
-//! Draws what is not opaque over what is: the volume, surfaces with opacity, and shade. See `composite.wgsl`.
+//! Draws what is not opaque over what is: the volume, and surfaces with opacity. See `composite.wgsl`.
 
 use crate::geom::SingleValues;
 use crate::gpu::buffers::GrowBuffer;
@@ -19,7 +19,6 @@ struct Settings {
     table: [f32; 4],
     corners: [u32; 4],
     start: [u32; 4],
-    shade: [f32; 4],
 }
 
 /// No tetrahedron.
@@ -30,7 +29,6 @@ pub(super) struct Composite {
     /// Made when they are needed first: they take longer to compile than all others.
     entries: Option<wgpu::RenderPipeline>,
     all: Option<wgpu::RenderPipeline>,
-    shade: Option<wgpu::RenderPipeline>,
     entries_layout: wgpu::BindGroupLayout,
     layout: wgpu::BindGroupLayout,
     medium: GrowBuffer<[f32; 4]>,
@@ -58,7 +56,6 @@ impl Composite {
         Self {
             entries: None,
             all: None,
-            shade: None,
             entries_layout: group_layout(context, "entries of the volume", &[Both, Both]),
             layout: group_layout(
                 context,
@@ -110,7 +107,7 @@ impl Composite {
     }
 
     /// Makes the pipelines that are needed and are not there yet.
-    pub(super) fn prepare(&mut self, context: &Context, common: &Common, lists: &FragmentLists, all: bool) {
+    pub(super) fn prepare(&mut self, context: &Context, common: &Common, lists: &FragmentLists) {
         let over = Output::Over(wgpu::CompareFunction::Always);
         let groups = [Some(&self.layout)];
         let spec = PipelineSpec {
@@ -121,11 +118,6 @@ impl Composite {
             groups: &groups,
             output: over,
         };
-        if !all {
-            let spec = PipelineSpec { fragment: "fs_shade", ..spec };
-            self.shade.get_or_insert_with(|| spec.create(context, common));
-            return;
-        }
         self.all.get_or_insert_with(|| spec.create(context, common));
         let groups = [Some(&self.entries_layout), Some(&lists.layout)];
         let output = Output::List { only_front: true };
@@ -143,18 +135,16 @@ impl Composite {
         }
     }
 
-    /// Draws all that is listed, and shade; or, without lists, shade alone.
+    /// Draws all that is listed.
     pub(super) fn draw(
         &self,
         context: &Context,
         mesh: &MeshBuffers,
-        lists: Option<&FragmentLists>,
+        lists: &FragmentLists,
         depth: &wgpu::TextureView,
-        shade: [f32; 2],
         pass: &mut wgpu::RenderPass<'_>,
     ) {
-        let pipeline = if lists.is_some() { &self.all } else { &self.shade };
-        let Some(pipeline) = pipeline else { return };
+        let Some(pipeline) = &self.all else { return };
         let parts = [mesh.points.binding(), mesh.faces.binding(), mesh.linked.buffer.binding()];
         let is_whole = self.has_volume() && parts.iter().all(Option::is_some);
         let [id, value, _] = self.start;
@@ -162,13 +152,12 @@ impl Composite {
             table: if is_whole { self.table } else { [0.0; 4] },
             corners: self.corners,
             start: [id, value, self.clips, 0],
-            shade: [shade[0], shade[1], 0.0, 0.0],
         };
         context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&settings));
         let or_nothing = |part: Option<_>| part.unwrap_or_else(|| self.nothing.as_entire_binding());
         let [points, faces, tets] = parts.map(or_nothing);
         let [heads, nodes] = lists
-            .and_then(FragmentLists::buffers)
+            .buffers()
             .map_or([None, None], |both| both.map(|buffer| Some(buffer.as_entire_binding())))
             .map(or_nothing);
         let medium = or_nothing(self.medium.binding());
@@ -186,6 +175,6 @@ mod tests {
 
     #[test]
     fn the_uniform_has_the_size_that_wgsl_gives_it() {
-        assert_eq!(size_of::<Settings>(), 4 * 16);
+        assert_eq!(size_of::<Settings>(), 3 * 16);
     }
 }

@@ -17,6 +17,7 @@ mod mesh;
 mod pipeline;
 mod present;
 mod renderer;
+mod shade;
 mod side_target;
 mod style;
 mod surface;
@@ -64,12 +65,13 @@ macro_rules! shader {
 }
 
 /// The shaders, each complete: name and WGSL source.
-pub const SHADERS: [(&str, &str); 7] = [
+pub const SHADERS: [(&str, &str); 8] = [
     ("background", shader!("background.wgsl")),
     ("surface", shader!("fragments.wgsl", "shading.wgsl", "surface.wgsl")),
     ("cells", shader!("shading.wgsl", "cells.wgsl")),
     ("volume_entries", shader!("fragments.wgsl", "crossing.wgsl", "volume_entries.wgsl")),
     ("composite", shader!("crossing.wgsl", "composite.wgsl")),
+    ("shade", shader!("shade.wgsl")),
     ("wire", shader!("fragments.wgsl", "wire.wgsl")),
     ("present", shader!("present.wgsl")),
 ];

@@ -32,6 +32,8 @@ pub(super) enum Binding {
     Depths,
     /// A picture that is looked up smoothly.
     Picture,
+    /// An image of numbers that are read as they are.
+    Numbers,
     /// How it is looked up.
     Sampler,
 }
@@ -52,9 +54,9 @@ impl Binding {
             Self::Write => (ShaderStages::FRAGMENT, buffer(BufferBindingType::Storage { read_only: false })),
             Self::Uniform => (ShaderStages::VERTEX_FRAGMENT, buffer(BufferBindingType::Uniform)),
             Self::Depths => (ShaderStages::FRAGMENT, texture(wgpu::TextureSampleType::Depth, true)),
-            Self::Picture => {
-                let float = wgpu::TextureSampleType::Float { filterable: true };
-                (ShaderStages::FRAGMENT, texture(float, false))
+            Self::Picture | Self::Numbers => {
+                let filterable = matches!(self, Self::Picture);
+                (ShaderStages::FRAGMENT, texture(wgpu::TextureSampleType::Float { filterable }, false))
             }
             Self::Sampler => {
                 (ShaderStages::FRAGMENT, BindingType::Sampler(wgpu::SamplerBindingType::Filtering))

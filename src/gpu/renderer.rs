@@ -7,6 +7,7 @@ use crate::gpu::fragments::FragmentLists;
 use crate::gpu::mesh::MeshBuffers;
 use crate::gpu::pipeline::{Common, Output, PipelineSpec};
 use crate::gpu::present::{PictureView, Presenter};
+use crate::gpu::shade::ShadePass;
 use crate::gpu::surface::{Surface, SurfacePipelines};
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
@@ -43,6 +44,8 @@ pub struct Renderer {
     shows_cells: bool,
     pub(super) lists: FragmentLists,
     composite: Composite,
+    /// Made when shade is drawn first.
+    shade: Option<ShadePass>,
     wire: WirePass,
     presenter: Presenter,
     /// Pictures that the device has not finished.
@@ -113,6 +116,7 @@ impl Renderer {
             shows_cells: false,
             lists: FragmentLists::new(&context),
             composite: Composite::new(&context),
+            shade: None,
             wire: WirePass::new(&context, &common),
             presenter: Presenter::new(&context, &common),
             in_flight: Arc::default(),
@@ -362,7 +366,8 @@ impl Renderer {
         let cells = self.cells.as_ref().map_or(0, CellPass::bytes);
         let surfaces: u64 = self.surfaces.values().map(Surface::bytes).sum();
         let drawn = self.mesh.bytes() + cells + surfaces + self.wire.bytes() + self.composite.bytes();
-        let images = self.target.images.bytes() + self.lists.image_bytes();
+        let shade = self.shade.as_ref().map_or(0, ShadePass::bytes);
+        let images = self.target.images.bytes() + self.lists.image_bytes() + shade;
         drawn + self.lists.bytes() + images + self.beside.as_ref().map_or(0, |other| other.memory())
     }
 
@@ -473,16 +478,18 @@ impl Renderer {
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = self.context.device.create_command_encoder(&descriptor);
         let has_lists = self.composite.has_volume() || self.surfaces.values().any(Surface::is_listed);
-        let has_composite = has_lists || look.shade[0] > 0.0;
-        if has_composite {
-            self.composite.prepare(&self.context, &self.common, &self.lists, has_lists);
-        }
+        let has_shade = look.shade[0] > 0.0 && self.has_opaque();
+        let has_more = has_lists || has_shade;
         if has_lists {
+            self.composite.prepare(&self.context, &self.common, &self.lists);
             self.list(&mut encoder);
         }
-        self.opaque(&mut encoder, !look.clips.is_empty(), has_composite);
-        if has_composite {
-            self.over(&mut encoder, look, has_lists);
+        self.opaque(&mut encoder, !look.clips.is_empty(), has_more);
+        if has_shade {
+            self.find_shade(&mut encoder, look.shade);
+        }
+        if has_more {
+            self.over(&mut encoder, has_shade, has_lists);
         }
         let images = &self.target.images;
         self.presenter.present(&self.context, &mut encoder, &self.common, images, count, view);
@@ -512,16 +519,29 @@ impl Renderer {
         self.wire.list(&mut pass);
     }
 
-    /// Draws what is opaque; without a composite after it also the lines over it.
-    fn opaque(&self, encoder: &mut wgpu::CommandEncoder, has_clips: bool, has_composite: bool) {
+    /// Whether anything is drawn that shade can fall on.
+    fn has_opaque(&self) -> bool {
+        self.shows_cells || self.surfaces.values().any(|surface| !surface.is_listed())
+    }
+
+    /// Finds where there is shade on what has been drawn.
+    fn find_shade(&mut self, encoder: &mut wgpu::CommandEncoder, shade: [f32; 2]) {
+        let (context, common) = (&self.context, &self.common);
+        let drawn = (self.target.drawn_size, &self.target.images.depth);
+        let pass = self.shade.get_or_insert_with(|| ShadePass::new(context, common));
+        pass.find(context, encoder, common, drawn, shade);
+    }
+
+    /// Draws what is opaque; if nothing comes after it also the lines over it.
+    fn opaque(&self, encoder: &mut wgpu::CommandEncoder, has_clips: bool, has_more: bool) {
         let images = &self.target.images;
-        let stored = if has_composite { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
+        let stored = if has_more { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("opaque"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &images.samples,
                 depth_slice: None,
-                resolve_target: (!has_composite).then_some(&images.resolved),
+                resolve_target: (!has_more).then_some(&images.resolved),
                 ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: stored },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
@@ -538,13 +558,13 @@ impl Renderer {
         if let (true, Some(cells)) = (self.shows_cells, &self.cells) {
             cells.draw(&self.context, &self.mesh, has_clips, &mut pass);
         }
-        if !has_composite {
+        if !has_more {
             self.wire.draw(&mut pass, false);
         }
     }
 
-    /// Draws what is not opaque over it.
-    fn over(&self, encoder: &mut wgpu::CommandEncoder, look: &Look, has_lists: bool) {
+    /// Lays shade over it, then what is not opaque.
+    fn over(&self, encoder: &mut wgpu::CommandEncoder, has_shade: bool, has_lists: bool) {
         let images = &self.target.images;
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("composite"),
@@ -563,8 +583,12 @@ impl Renderer {
             ..Default::default()
         });
         pass.set_bind_group(0, &self.common.group, &[]);
-        let lists = has_lists.then_some(&self.lists);
-        self.composite.draw(&self.context, &self.mesh, lists, &images.depth, look.shade, &mut pass);
+        if let Some(shade) = self.shade.as_ref().filter(|_| has_shade) {
+            shade.draw(&self.context, &images.depth, &mut pass);
+        }
+        if has_lists {
+            self.composite.draw(&self.context, &self.mesh, &self.lists, &images.depth, &mut pass);
+        }
         self.wire.draw(&mut pass, has_lists);
     }
 

@@ -242,10 +242,7 @@ impl Images {
     fn new(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
         use wgpu::TextureUsages as Usage;
         let bound = Usage::RENDER_ATTACHMENT | Usage::TEXTURE_BINDING;
-        let view = |label, format, samples, usage| {
-            let image = texture(context, label, size, format, samples, usage);
-            image.create_view(&wgpu::TextureViewDescriptor::default())
-        };
+        let view = |label, format, samples, usage| image(context, label, size, format, samples, usage);
         Self {
             samples: view("samples", format, SAMPLES, Usage::RENDER_ATTACHMENT),
             depth: view("depth", DEPTH, SAMPLES, bound),
@@ -265,6 +262,19 @@ pub(super) fn image_bytes(view: &wgpu::TextureView) -> u64 {
     let image = view.texture();
     let pixels = u64::from(image.width()) * u64::from(image.height()) * u64::from(image.sample_count());
     pixels * u64::from(image.format().block_copy_size(None).unwrap_or(0))
+}
+
+/// A new image, seen as a whole.
+pub(super) fn image(
+    context: &Context,
+    label: &str,
+    size: [u32; 2],
+    format: wgpu::TextureFormat,
+    sample_count: u32,
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureView {
+    let texture = texture(context, label, size, format, sample_count, usage);
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 fn texture(

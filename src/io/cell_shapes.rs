@@ -29,10 +29,12 @@ const HEXAHEDRON: &[&[u8]] =
     &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
 
 /// Edges in the order of the points at their middle.
-const TETRAHEDRON_EDGES: &[[u8; 2]] = &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
-const PYRAMID_EDGES: &[[u8; 2]] = &[[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]];
-const WEDGE_EDGES: &[[u8; 2]] = &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]];
-const HEXAHEDRON_EDGES: &[[u8; 2]] =
+pub(super) const TETRAHEDRON_EDGES: &[[u8; 2]] = &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
+pub(super) const PYRAMID_EDGES: &[[u8; 2]] =
+    &[[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]];
+pub(super) const WEDGE_EDGES: &[[u8; 2]] =
+    &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]];
+pub(super) const HEXAHEDRON_EDGES: &[[u8; 2]] =
     &[[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 /// The points of a triquadratic hexahedron, x fastest, then y, then z.

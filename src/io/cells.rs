@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use crate::io::cell_shapes::{PYRAMID_14, Recipe, recipe};
-use crate::io::error::{ReadReason, cell_name, named_counts, names};
+use crate::io::error::{ReadReason, cell_name, names};
 use crate::io::vtu::{GHOST_CELL, HIDDEN_CELL};
 use crate::mesh::{CellNumbers, Field, MeshInput};
 
@@ -97,7 +97,7 @@ pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
         }
     }
     if tets == 0 && !types.is_empty() {
-        return Err(no_volume(&counts.into_iter().collect::<Vec<_>>()));
+        return Err(ReadReason::CellTypes(counts.into_iter().collect()));
     }
     Ok(tets)
 }
@@ -108,11 +108,6 @@ fn counts_of(types: &[i64]) -> BTreeMap<i64, u64> {
         *counts.entry(*kind).or_insert(0_u64) += 1;
     }
     counts
-}
-
-/// Why a mesh of nothing but these cells, types and counts, is refused.
-fn no_volume(counts: &[(i64, u64)]) -> ReadReason {
-    ReadReason::NoVolume(named_counts(counts))
 }
 
 /// The number of our own for a cell that VTK's flags leave out.
@@ -390,7 +385,7 @@ mod tests {
     #[test]
     fn cells_that_are_wrong_are_refused() {
         assert_eq!(most_tets(&[10, 42]), Err(ReadReason::CellTypes(vec![(10, 1), (42, 1)])));
-        assert_eq!(most_tets(&[5, 5]), Err(ReadReason::NoVolume("2 triangles".into())));
+        assert_eq!(most_tets(&[5, 5]), Err(ReadReason::CellTypes(vec![(5, 2)])));
         assert_eq!(most_tets(&[]), Ok(0));
         let wrong = |ends: &[i64]| checked_ends(&[10, 12], ends).unwrap_err().to_string();
         assert!(wrong(&[4, 8]).contains("cell 1, a hexahedron, has 4 points, not 8"));

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::io::cell_shapes::PYRAMID_14;
-use crate::io::cells::{ANY_ORDER, GHOST, HIDDEN};
+use crate::io::cells::{ANY_ORDER, GHOST, HIDDEN, is_flat};
 
 /// A file that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -71,19 +71,10 @@ pub enum ReadReason {
         remedy: String,
     },
     /// There are cells that cannot be split into tetrahedra: VTK cell type and count of all.
-    #[error(
-        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones and \
-         Lagrange cells of the first two orders, and what has no volume is left out beside them: convert the others (in ParaView: \
-         Tetrahedralize), or save them with an order of at most 2",
-        list = named_counts(.0),
-        total = .0.iter().map(|c| c.1).sum::<u64>()
-    )]
+    #[error("{}", of_cells(.0))]
     CellTypes(Vec<(i64, u64)>),
     /// Nothing but what has no volume, in words.
-    #[error(
-        "{0}: surfaces, lines and points have no volume, which an MT is of; fill the surface with tetrahedra first (with Gmsh, \
-         TetGen or fTetWild, for example)"
-    )]
+    #[error("{}", no_volume(.0))]
     NoVolume(String),
     /// A value or coordinate is infinite or not a number, at a point that cells use.
     #[error("{}", not_finite(.array, "point", *.point))]
@@ -164,6 +155,26 @@ fn named_count(kind: i64, count: u64) -> String {
         Some((one, many)) => format!("{count} {}{points}", if count == 1 { one } else { many }),
         None => format!("{count} {} of type {of}{points}", if count == 1 { "cell" } else { "cells" }),
     }
+}
+
+/// Why cells of these types, and so many, are refused.
+fn of_cells(counts: &[(i64, u64)]) -> String {
+    let total: u64 = counts.iter().map(|(_, count)| count).sum();
+    let list = named_counts(counts);
+    if counts.iter().all(|(kind, _)| is_flat(*kind)) {
+        return no_volume(&list);
+    }
+    format!(
+        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones and Lagrange \
+         cells of the first two orders, and what has no volume is left out beside them: convert the others (in ParaView: \
+         Tetrahedralize), or save them with an order of at most 2"
+    )
+}
+
+fn no_volume(what: &str) -> String {
+    format!(
+        "a mesh of surfaces or lines ({what}), which has no volume; fill it with tetrahedra first, with Gmsh, TetGen or fTetWild"
+    )
 }
 
 /// What a cell of this type is called.

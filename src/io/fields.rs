@@ -64,12 +64,26 @@ impl<'a> Collector<'a> {
     ///
     /// An array without a name is called `field`; a name that is taken gets a number.
     pub fn claim(&mut self, name: &str, components: usize) -> Result<Option<Claim>, ReadReason> {
+        if components > 0 && components < MAX_FIELDS {
+            let names: Vec<String> = (0..components).map(|c| component_name(components, c)).collect();
+            return self.claim_named(name, &names, true);
+        }
         self.last = 0;
+        if !self.admits(name, components)? {
+            return Ok(None);
+        }
+        let name = self.free_name(if name.is_empty() { "field" } else { name });
+        let fields = vec![self.scalar(&name)];
+        Ok(self.chosen(fields, components))
+    }
+
+    /// Whether there is a field in an array, and not too many where they may be wanted.
+    fn admits(&self, name: &str, components: usize) -> Result<bool, ReadReason> {
         let name = if name.is_empty() { "field" } else { name };
         let is_asked_for = self.may_want(name);
         if components == 0 {
             let what = format!("array \"{name}\" has no components");
-            return if is_asked_for && !self.lists { Err(ReadReason::Syntax(what)) } else { Ok(None) };
+            return if is_asked_for && !self.lists { Err(ReadReason::Syntax(what)) } else { Ok(false) };
         }
         // Without points a few bytes can claim any number of components.
         let is_wide =
@@ -81,14 +95,30 @@ impl<'a> Collector<'a> {
             return Err(ReadReason::TooLarge { what, limit: MAX_FIELDS as u64 });
         }
         if self.names.len() > MAX_NAMES {
-            return Err(ReadReason::TooLarge {
-                what: "fields and components".into(),
-                limit: MAX_NAMES as u64,
-            });
+            let what = "fields and components".into();
+            return Err(ReadReason::TooLarge { what, limit: MAX_NAMES as u64 });
         }
-        let name = self.free_name(name);
-        let fields =
-            if components >= MAX_FIELDS { vec![self.scalar(&name)] } else { self.parts(&name, components) };
+        Ok(true)
+    }
+
+    /// The same for an array whose components have these names; `has_length` if it is a vector or tensor.
+    pub fn claim_named(
+        &mut self,
+        name: &str,
+        of_components: &[String],
+        has_length: bool,
+    ) -> Result<Option<Claim>, ReadReason> {
+        self.last = 0;
+        if !self.admits(name, of_components.len())? {
+            return Ok(None);
+        }
+        let name = self.free_name(if name.is_empty() { "field" } else { name });
+        let fields = self.parts(&name, of_components, has_length);
+        Ok(self.chosen(fields, of_components.len()))
+    }
+
+    /// Which of the fields are wanted, if any; the names of others are kept.
+    fn chosen(&mut self, fields: Vec<Field>, components: usize) -> Option<Claim> {
         let mut is_first = self.first && self.fields.is_empty();
         let is_wanted = |field: &Field| {
             let is_named = self.wanted.is_none_or(|names| names.iter().any(|name| field.answers_to(name)));
@@ -97,7 +127,7 @@ impl<'a> Collector<'a> {
         let wanted: Vec<bool> = fields.iter().map(is_wanted).collect();
         let others = fields.iter().zip(&wanted).filter(|(_, wanted)| !**wanted);
         self.others.extend(others.map(|(field, _)| field.clone()));
-        Ok(wanted.contains(&true).then_some(Claim { fields, components, wanted }))
+        wanted.contains(&true).then_some(Claim { fields, components, wanted })
     }
 
     /// Whether a field of an array of this name may be wanted.
@@ -112,21 +142,25 @@ impl<'a> Collector<'a> {
         Field::new(self.take_name(name), Vec::new())
     }
 
-    /// The fields of an array of so many components, without values.
-    fn parts(&mut self, name: &str, components: usize) -> Vec<Field> {
-        if components == 1 {
+    /// The fields of an array whose components have these names, without values.
+    fn parts(&mut self, name: &str, of_components: &[String], has_length: bool) -> Vec<Field> {
+        if of_components.len() == 1 {
             return vec![self.scalar(name)];
         }
+        // No field has the name of a vector, but the array that is written of it.
+        self.take_name(name);
         let part = |component| Some(VectorPart { name: name.to_owned(), component });
         let mut fields = Vec::new();
-        for c in 0..components {
-            let own = self.take_name(&format!("{name}_{}", component_name(components, c)));
+        for (c, of_component) in of_components.iter().enumerate() {
+            let own = self.take_name(&format!("{name}_{of_component}"));
             // The number of a component is a byte.
             let vector = u8::try_from(c).ok().and_then(|c| part(Some(c)));
             fields.push(Field { vector, ..Field::new(own, Vec::new()) });
         }
-        let own = self.take_name(&format!("{name}_magnitude"));
-        fields.push(Field { vector: part(None), ..Field::new(own, Vec::new()) });
+        if has_length {
+            let own = self.take_name(&format!("{name}_magnitude"));
+            fields.push(Field { vector: part(None), ..Field::new(own, Vec::new()) });
+        }
         fields
     }
 
@@ -253,6 +287,12 @@ fn length(vector: &[f64]) -> f64 {
     largest * vector.iter().map(|x| (x / largest) * (x / largest)).sum::<f64>().sqrt()
 }
 
+/// Some components of values that have so many each, in this order.
+#[cfg(feature = "formats")]
+pub(super) fn in_order(values: &[f64], components: usize, order: &[usize]) -> Vec<f64> {
+    values.chunks_exact(components).flat_map(|tuple| order.iter().map(|&c| tuple[c])).collect()
+}
+
 /// One component of values that have so many each, one value after the other.
 pub(super) fn component_of(values: &[f64], component: usize, components: usize) -> Vec<f64> {
     values.iter().skip(component).step_by(components).copied().collect()
@@ -315,6 +355,16 @@ mod tests {
     fn options(names: Option<&[&str]>, first: bool) -> ReadOptions {
         let fields = names.map(|names| names.iter().map(|&name| name.to_owned()).collect());
         ReadOptions { fields, first, ..ReadOptions::default() }
+    }
+
+    #[test]
+    fn no_two_arrays_have_one_name() {
+        let mut all = Collector::default();
+        append(&mut all, "v", 2, vec![3.0, 4.0]).unwrap();
+        append(&mut all, "v", 2, vec![3.0, 4.0]).unwrap();
+        append(&mut all, "v", 1, vec![1.0]).unwrap();
+        assert_eq!(names(&all), ["v_x", "v_y", "v_magnitude", "v_2_x", "v_2_y", "v_2_magnitude", "v_3"]);
+        assert_eq!(all.fields[3].vector, Some(VectorPart { name: "v_2".into(), component: Some(0) }));
     }
 
     #[test]

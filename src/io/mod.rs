@@ -12,8 +12,8 @@
 //! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; feature `formats` | |
 //! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
 //! | Netgen | `.vol` | feature `formats` | |
-//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text; feature `formats` | |
-//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib; feature `formats` | |
+//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal; feature `formats` | |
+//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text; feature `formats` | |
 //! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; feature `hdf5` | |
 //! | Exodus II | `.exo`, `.ex2`, `.e` | feature `hdf5` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
@@ -34,6 +34,7 @@ mod cell_shapes;
 mod cells;
 mod error;
 mod fields;
+mod foreign;
 #[cfg(feature = "formats")]
 mod formats;
 mod image;
@@ -118,9 +119,10 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     read_unexpanded(path, options).map(expanded)
 }
 
-/// The same mesh with finite numbers at points that no cell uses.
+/// The same mesh with finite numbers at points that no cell uses, and with all notes in words.
 fn settled(mut mesh: TetMesh) -> TetMesh {
     fields::settle_unused(&mut mesh);
+    mesh.notes.extend(mesh.input.lines());
     mesh
 }
 
@@ -141,6 +143,9 @@ pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, Re
 
 fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let name = path.display().to_string();
+    if path.is_dir() {
+        return Err(foreign::refused_folder(path)).at(String::new).map_err(|error| in_file(error, &name));
+    }
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
@@ -199,7 +204,7 @@ fn read_in(
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::read(bytes, options)
-    } else if start.starts_with(b"<") {
+    } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
         read_xml(start, options, beside)
     } else {
         read_other(name, bytes, options, beside)
@@ -216,12 +221,12 @@ fn read_other(
     beside: Beside<'_>,
 ) -> Result<TetMesh, ReadError> {
     formats::read(name, bytes, options, beside)
-        .unwrap_or_else(|| Err(ReadReason::UnknownFormat).at(String::new))
+        .unwrap_or_else(|| Err(foreign::refused(name, bytes)).at(String::new))
 }
 
 #[cfg(not(feature = "formats"))]
-fn read_other(_: &str, _: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
-    Err(ReadReason::UnknownFormat).at(String::new)
+fn read_other(name: &str, bytes: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
+    Err(foreign::refused(name, bytes)).at(String::new)
 }
 
 /// Reads raw samples, given their JSON sidecar:

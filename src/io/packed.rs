@@ -105,7 +105,7 @@ mod tests {
         assert_eq!(stated_size(&members), (members.len() + STEP) as u64);
         members.extend(packed(&file[STEP..]));
         assert_eq!(unpacked(&members).unwrap(), file);
-        assert_eq!(head(&members), file[..STEP]);
+        assert_eq!(head(&members).as_ref(), &file[..STEP]);
         assert!(matches!(unpack(&members, STEP as u64), Err(ReadReason::TooLarge { .. })));
         for length in 3..members.len() {
             assert!(!unpacked(&members[..length]).is_ok_and(|bytes| bytes.len() == file.len()), "{length}");

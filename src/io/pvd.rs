@@ -8,7 +8,7 @@ use quick_xml::Reader;
 use quick_xml::events::Event;
 
 use crate::io::error::{At, ReadError, ReadReason};
-#[cfg(feature = "hdf5")]
+#[cfg(feature = "formats")]
 use crate::io::formats;
 use crate::io::write::escaped;
 use crate::io::xml::Attributes;
@@ -26,7 +26,7 @@ pub struct Step {
 }
 
 /// The time steps that the file at `path` stands for: those that it lists if it is a `.pvd`, in ascending order, those that it
-/// has if it is VTKHDF or Exodus, else itself alone.
+/// has if it is VTKHDF, Exodus or Gmsh, else itself alone.
 ///
 /// # Errors
 /// If the list cannot be read, is damaged or empty, or has several files for one time.
@@ -49,12 +49,12 @@ pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
 }
 
 /// The times of the steps in a file that may have several.
-#[cfg(feature = "hdf5")]
+#[cfg(feature = "formats")]
 fn times_in(path: &Path) -> Result<Vec<f64>, ReadError> {
-    formats::hdf5::times_at(path)
+    formats::times_at(path)
 }
 
-#[cfg(not(feature = "hdf5"))]
+#[cfg(not(feature = "formats"))]
 fn times_in(_: &Path) -> Result<Vec<f64>, ReadError> {
     Ok(Vec::new())
 }

@@ -3,7 +3,7 @@
 use crate::io::error::{At, ReadError, ReadReason};
 #[cfg(feature = "formats")]
 use crate::io::{CellData, ReadOptions, formats};
-use crate::io::{image, in_file, legacy, packed, raw, structured, vtu, xml};
+use crate::io::{foreign, image, in_file, legacy, packed, raw, structured, vtu, xml};
 use crate::mesh::{Field, Grid};
 
 /// What a file says that it contains. The data may be damaged even so.
@@ -65,7 +65,7 @@ pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
     let start = super::without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::survey(bytes)
-    } else if start.starts_with(b"<") {
+    } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
         survey_xml(start)
     } else {
         survey_other(name, bytes)
@@ -76,7 +76,9 @@ pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
 /// Says what a file of a format contains that is not VTK's: these are read for it.
 #[cfg(feature = "formats")]
 fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
-    let Some(format) = formats::name(bytes) else { return Err(ReadReason::UnknownFormat).at(String::new) };
+    let Some(format) = formats::name(bytes) else {
+        return Err(foreign::refused(name, bytes)).at(String::new);
+    };
     let options = ReadOptions { cells: CellData::Names, ..ReadOptions::default() };
     let mesh = super::read_bytes_with(name, bytes, &options)?;
     let described =
@@ -92,8 +94,8 @@ fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
 }
 
 #[cfg(not(feature = "formats"))]
-fn survey_other(_: &str, _: &[u8]) -> Result<Survey, ReadError> {
-    Err(ReadReason::UnknownFormat).at(String::new)
+fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
+    Err(foreign::refused(name, bytes)).at(String::new)
 }
 
 /// Says what the JSON sidecar of raw samples describes.

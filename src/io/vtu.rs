@@ -98,7 +98,7 @@ impl PieceReader<'_, '_> {
         split.spread(&mut cell_fields);
         let mut input = MeshInput { other_fields, other_cell_fields, ..split.input };
         self.document.part_name(self.number).into_iter().for_each(|name| input.cells.name_part(name));
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input })
+        Ok(TetMesh { positions, fields, tets: split.tets, cell_fields, input, ..TetMesh::default() })
     }
 
     /// The fields in a section, each of `tuples` values, and the names of those that are not asked for.

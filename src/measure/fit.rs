@@ -7,7 +7,7 @@
 //! (iteratively reweighted least squares); each of these by conjugate gradients.
 
 use super::Reference;
-use crate::geom::{PointGrid, TriangleGrid, weights_at, weights_on_triangle};
+use crate::geom::{PointGrid, TetPlaces, TriangleGrid, weights_on_triangle};
 use crate::mesh::boundary_faces;
 use crate::mt::{CurrentMesh, MtInfo};
 use glam::DVec3;
@@ -100,12 +100,12 @@ impl System {
         let mut found: Vec<Option<([u32; 4], [f64; 4])>> = vec![None; places.len()];
         for &tet in mesh.tets() {
             let corners = tet.map(|slot| mesh.positions()[slot as usize]);
+            let at_tet = TetPlaces::new(corners);
             grid.near_tet(&corners, |i| {
                 let row = &mut found[i as usize];
                 if row.is_none() {
                     let place = (DVec3::from(places[i as usize]) - origin) / step;
-                    *row =
-                        weights_at(corners, grid.points()[i as usize], place).map(|weights| (tet, weights));
+                    *row = at_tet.weights(grid.points()[i as usize], place).map(|weights| (tet, weights));
                 }
             });
         }

@@ -245,7 +245,7 @@ pub(crate) fn non_manifold(
 }
 
 /// The tetrahedra around each of so many vertices, in increasing order.
-pub(crate) fn stars(points: usize, tets: &[[u32; 4]]) -> Groups {
+fn stars(points: usize, tets: &[[u32; 4]]) -> Groups {
     Groups::new(points, |add| {
         (0..).zip(tets).for_each(|(t, tet)| tet.iter().for_each(|v| add(*v as usize, t)));
     })

@@ -61,6 +61,8 @@ impl TetMesh {
         }
         self.fields.extend(step.fields);
         self.cell_fields.extend(step.cell_fields.into_iter().filter(|f| !f.values.is_empty()));
+        let new: Vec<String> = step.notes.into_iter().filter(|note| !self.notes.contains(note)).collect();
+        self.notes.extend(new);
         Ok(())
     }
 

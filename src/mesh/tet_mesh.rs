@@ -66,13 +66,15 @@ pub struct TetMesh {
     pub grid: Option<Grid>,
     /// Scalar fields at the cells, each as long as `tets`; without values where only their names were asked for.
     pub cell_fields: Vec<Field>,
+    /// What its reader left out of the file, or took in a way that the file does not state: in words, for users.
+    pub notes: Vec<String>,
     /// What is known of the input that it was read from.
     pub input: MeshInput,
 }
 
 impl PartialEq for TetMesh {
     fn eq(&self, other: &Self) -> bool {
-        let Self { positions, fields, tets, grid, cell_fields, input: _ } = self;
+        let Self { positions, fields, tets, grid, cell_fields, input: _, notes: _ } = self;
         *positions == other.positions
             && *fields == other.fields
             && *tets == other.tets

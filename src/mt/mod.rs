@@ -230,6 +230,19 @@ impl MtInfo {
 }
 
 impl MtInfo {
+    /// The smallest and the largest value of a field over all of its time steps, which are the fields of its name: what means the
+    /// same at all times.
+    ///
+    /// # Panics
+    /// If there is no such field.
+    pub fn range_at_all_times(&self, field: usize) -> [f64; 2] {
+        let name = &self.fields[field].name;
+        let steps = self.fields.iter().filter(|step| step.name == *name);
+        steps.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], step| {
+            [low.min(step.min), high.max(step.max)]
+        })
+    }
+
     /// The largest error of a field, in its units, at the reference vertices inside a mesh within `error`, where the input has them.
     pub fn field_bound(&self, field: usize, error: f64) -> f64 {
         error.max(self.floor(field)) * self.fields[field].range()

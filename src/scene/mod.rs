@@ -21,6 +21,7 @@ use crate::view::{ClipPlane, ColourScale, Probe, ScaleError};
 use glam::DVec3;
 use kept::Kept;
 use objects::{Objects, Shown};
+use styles::{quantity, scale};
 use thiserror::Error;
 
 /// The outline of the domain, on a dark and on a light background.
@@ -172,6 +173,16 @@ impl Scene {
         self.renderer.triangles()
     }
 
+    /// Looks up the box around the session's mesh if that is there for the first time; whether it is. [`Scene::update`] does so, too.
+    pub fn meet(&mut self, session: &mut Session) -> bool {
+        if self.bounds.is_some() || session.info().is_none() {
+            return false;
+        }
+        self.bounds = Some(session.view().bounds());
+        self.is_stale = true;
+        true
+    }
+
     /// Brings what is shown up to date with the session's mesh; whether anything has changed, so that a new picture is due.
     ///
     /// # Errors
@@ -180,10 +191,7 @@ impl Scene {
         if session.info().is_none() {
             return Ok(std::mem::take(&mut self.is_stale));
         }
-        if self.bounds.is_none() {
-            self.bounds = Some(session.view().bounds());
-            self.is_stale = true;
-        }
+        self.meet(session);
         let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
         let is_stale = std::mem::take(&mut self.is_stale);
         if is_stale {
@@ -330,7 +338,45 @@ fn check(state: &SceneState) -> Result<(), SceneError> {
     if state.isosurfaces.iter().any(|surface| surface.value.is_some_and(|value| !value.is_finite())) {
         return Err(SceneError::state("isosurfaces", "values must be finite numbers"));
     }
+    if let Some(cells) = &state.cells {
+        quantity(cells)?;
+    }
+    if let Some(range) = state.colours.range {
+        scale(&state.colours, Some(range), range)?;
+    }
+    check_numbers(state)?;
     check_volume(state)
+}
+
+/// Numbers that are to be drawn with: finite, and lengths positive.
+fn check_numbers(state: &SceneState) -> Result<(), SceneError> {
+    let (tubes, arrows) = (state.streamlines.as_ref(), state.arrows.as_ref());
+    let lengths = [
+        ("streamlines.radius", tubes.and_then(|tubes| tubes.radius)),
+        ("arrows.spacing", arrows.and_then(|arrows| arrows.spacing)),
+        ("volume.unitLength", state.volume.as_ref().and_then(|volume| volume.unit_length)),
+    ];
+    let is_length = |length: f64| length.is_finite() && length > 0.0;
+    if let Some((what, _)) =
+        lengths.iter().find(|(_, length)| length.is_some_and(|length| !is_length(length)))
+    {
+        return Err(SceneError::state(*what, "must be a positive number"));
+    }
+    if tubes.is_some_and(|tubes| tubes.seeds.as_flattened().iter().any(|x| !x.is_finite())) {
+        return Err(SceneError::state("streamlines.seeds", "must be points of three finite numbers"));
+    }
+    let cells =
+        state.cells.as_ref().map(|cells| [("cells.shrink", cells.shrink), ("cells.width", cells.width)]);
+    let opacities = state.isosurfaces.iter().map(|surface| ("isosurfaces", surface.opacity));
+    let opacities = opacities.chain(state.slices.iter().map(|slice| ("slices", slice.opacity)));
+    let opacities = opacities.chain(state.boundary.as_ref().map(|boundary| ("boundary", boundary.opacity)));
+    let mut numbers = opacities.chain(cells.into_iter().flatten()).chain([("shade", state.shade)]);
+    match numbers.find(|(_, number)| !number.is_finite()) {
+        Some((what, number)) => {
+            Err(SceneError::state(what, format!("must be a finite number, not {number}")))
+        }
+        None => Ok(()),
+    }
 }
 
 fn check_volume(state: &SceneState) -> Result<(), SceneError> {
@@ -344,9 +390,6 @@ fn check_volume(state: &SceneState) -> Result<(), SceneError> {
     if !values.is_sorted() || !volume.opacities.is_empty() && !volume.points.is_empty() {
         let problem = "give `opacities` or `points`, not both, with ascending values";
         return Err(SceneError::state("volume", problem));
-    }
-    if volume.unit_length.is_some_and(|length| !(length.is_finite() && length > 0.0)) {
-        return Err(SceneError::state("volume.unitLength", "must be a positive number"));
     }
     Ok(())
 }

@@ -98,8 +98,7 @@ impl Input<'_> {
             let most = if largest > 0.0 { largest } else { 1.0 };
             return scale(&ColourState { log: false, ..self.state.colours.clone() }, None, [-most, most]);
         }
-        let field_info = &self.info.fields[field];
-        let own = [field_info.min, field_info.max];
+        let own = self.info.range_at_all_times(field);
         scale(&self.state.colours, if field == self.shown { self.state.colours.range } else { None }, own)
     }
 
@@ -109,6 +108,15 @@ impl Input<'_> {
             Some(largest) => SingleValues::of([-largest, largest], 0.0),
             None => self.info.fields[field].single_values(),
         }
+    }
+
+    /// From 0 to the largest length that the components of a vector allow at any time: whatever is drawn of it has the same colours.
+    fn lengths(&self, names: &[String; 3]) -> [f64; 2] {
+        let largest = |name: &String| {
+            let steps = self.info.fields.iter().filter(|step| step.name == *name);
+            steps.fold(0.0_f64, |most, step| most.max(step.min.abs()).max(step.max.abs()))
+        };
+        [0.0, names.iter().map(largest).fold(0.0, f64::hypot)]
     }
 
     /// What colours by a field: its values, or the difference.
@@ -231,11 +239,11 @@ impl Objects {
             renderer.remove_surface(ISOSURFACES + gone as u32);
         }
         self.isosurfaces.resize_with(wanted, Isosurface::default);
-        let field = &input.info.fields[input.shown];
+        let [low, high] = input.info.range_at_all_times(input.shown);
         for (key, (own, state)) in
             (ISOSURFACES..).zip(self.isosurfaces.iter_mut().zip(&input.state.isosurfaces))
         {
-            let value = state.value.unwrap_or_else(|| f64::midpoint(field.min, field.max));
+            let value = state.value.unwrap_or_else(|| f64::midpoint(low, high));
             own.surface.update(&mesh, &[value], vertices, tets);
             let changes = own.surface.take_changes();
             let is_coloured = state.field.is_some() || input.largest_difference.is_some();
@@ -376,7 +384,7 @@ impl Objects {
                 self.tubes.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
             }
         }
-        self.show_solids(renderer, input, TUBES, values, "speed")
+        self.show_solids(renderer, input, TUBES, values, ("speed", input.lengths(fields)))
     }
 
     fn update_arrows(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
@@ -393,17 +401,17 @@ impl Objects {
         };
         let components = [vectors[0].as_slice(), &vectors[1], &vectors[2]];
         self.arrows.set_arrows(input.mesh, components, numbers.as_deref(), &options);
-        self.show_solids(renderer, input, ARROWS, values, "magnitude")
+        self.show_solids(renderer, input, ARROWS, values, ("magnitude", input.lengths(fields)))
     }
 
-    /// Draws the tubes or arrows, coloured by a field or by `own`, what they are made of.
+    /// Draws the tubes or arrows, coloured by a field or by `own`, the name and the range of what they are made of.
     fn show_solids(
         &mut self,
         renderer: &mut Renderer,
         input: &Input<'_>,
         key: u32,
         field: Option<usize>,
-        own: &str,
+        (own, lengths): (&str, [f64; 2]),
     ) -> Result<(), SceneError> {
         let solids = if key == TUBES { &self.tubes } else { &self.arrows };
         let single =
@@ -411,7 +419,7 @@ impl Objects {
         renderer.set_surface(key, &Triangles { single, ..Triangles::from(solids) }, None)?;
         let colours = match field {
             Some(field) => input.scale(field)?,
-            None => scale(&input.state.colours, None, range(&solids.values))?,
+            None => scale(&input.state.colours, None, lengths)?,
         };
         renderer.set_style(key, &Style { colouring: Colouring::Scale(colours), ..Style::default() });
         let label = field.map_or(own, |field| &input.info.fields[field].name).to_owned();

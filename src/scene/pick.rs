@@ -28,8 +28,7 @@ impl Objects {
         let hits = surfaces.filter_map(|(triangles, clips)| first_hit(&triangles, ray, clips));
         let mut found: Vec<(f64, [f64; 3])> = hits.map(|hit| (hit.distance, hit.position)).collect();
         let shown = session.field();
-        let info = session.info()?.fields.get(shown)?;
-        let own = [info.min, info.max];
+        let own = session.info()?.range_at_all_times(shown);
         let mut probe = Probe::new(session.view());
         // What clip planes cut open is closed by sections with them.
         let is_closed = state.boundary.as_ref().is_some_and(|boundary| boundary.clipped);

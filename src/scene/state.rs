@@ -94,7 +94,7 @@ impl PlaneState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
 pub struct IsosurfaceState {
-    /// In units of the field; the middle of its range if it is left out.
+    /// In units of the field; the middle of its range over all of its time steps if it is left out.
     pub value: Option<f64>,
     /// 0 to 1.
     pub opacity: f64,
@@ -290,7 +290,7 @@ pub struct StreamlineState {
     pub seeds: Vec<[f64; 3]>,
     /// Radius in model units; 1/400 of the domain's diagonal if it is left out.
     pub radius: Option<f64>,
-    /// The field that colours them; the speed if it is left out.
+    /// The field that colours them; the speed if it is left out, from 0 to the largest that the ranges of the components allow.
     pub field: Option<String>,
 }
 
@@ -302,7 +302,7 @@ pub struct ArrowState {
     pub fields: [String; 3],
     /// From one to the next, in model units; a twentieth of the domain's diagonal if it is left out.
     pub spacing: Option<f64>,
-    /// The field that colours them; the magnitude if it is left out.
+    /// The field that colours them; the magnitude if it is left out, over the range of the speed of [`StreamlineState::field`].
     pub field: Option<String>,
     /// Whether all have the same length.
     pub constant: bool,
@@ -331,11 +331,12 @@ impl Default for CompareState {
 pub struct ColourState {
     /// The colour map.
     pub map: MapName,
-    /// The values with the first and the last colour; the range of what is coloured if it is left out.
+    /// The values of the field that is shown with the first and the last colour; if it is left out, and for other fields, their range over
+    /// all of their time steps.
     pub range: Option<[f64; 2]>,
     /// Whether the colours run backwards.
     pub reversed: bool,
-    /// Whether the scale is logarithmic.
+    /// Whether the scale is logarithmic. Without a range it has the positive part of the values; without such a part it is linear.
     pub log: bool,
 }
 

@@ -6,14 +6,20 @@ use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Sty
 use crate::session::TetQuantity;
 use crate::view::{ClipPlane, ColourScale, Medium};
 
-/// The scale of a state: over `range` if there is one, else over what is there.
+/// A logarithmic scale over a range that is not positive begins at this part of its upper end.
+const LOG_START: f64 = 1e-3;
+
+/// The scale of a state: over `range` if there is one, else over what is there, of which a logarithmic scale has the positive part.
+/// Where there is none it is linear.
 pub(super) fn scale(
     colours: &ColourState,
     range: Option<[f64; 2]>,
-    own: [f64; 2],
+    [low, high]: [f64; 2],
 ) -> Result<ColourScale, SceneError> {
     let ColourState { map, reversed, log, .. } = *colours;
-    let scale = ColourScale { map: map.0, range: range.unwrap_or(own), is_reversed: reversed, is_log: log };
+    let is_log = log && (range.is_some() || high > 0.0);
+    let own = if is_log && low <= 0.0 { [LOG_START * high, high] } else { [low, high] };
+    let scale = ColourScale { map: map.0, range: range.unwrap_or(own), is_reversed: reversed, is_log };
     Ok(scale.validate()?)
 }
 
@@ -131,6 +137,16 @@ mod tests {
         assert_eq!(at(0.5), [0.4, 0.9]);
         assert_eq!((at(0.0), at(1.0)), (vec![0.0], vec![0.0]));
         assert!((opacity_at(&[[0.0, 0.0], [1.0, 0.5]], 0.5) - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn logarithms_are_of_the_positive_part_of_what_is_there() {
+        let colours = ColourState { log: true, ..ColourState::default() };
+        let of = |own| scale(&colours, None, own).map(|scale| (scale.range, scale.is_log)).expect("a scale");
+        assert_eq!(of([0.0, 4.0]), ([0.004, 4.0], true));
+        assert_eq!(of([1.0, 4.0]), ([1.0, 4.0], true));
+        assert_eq!(of([-2.0, -1.0]), ([-2.0, -1.0], false));
+        assert!(scale(&colours, Some([0.0, 1.0]), [1.0, 4.0]).is_err(), "a range that was asked for");
     }
 
     #[test]

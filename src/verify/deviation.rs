@@ -2,9 +2,9 @@
 
 use super::mesh_checks::{PlainMesh, PlainReference};
 use super::parts::{Ask, change, is_aside};
-use crate::geom::{PointGrid, TriangleGrid, weights_at, weights_on_triangle};
+use crate::geom::{PointGrid, TetPlaces, TriangleGrid, weights_on_triangle};
 use crate::mesh::{TetMesh, boundary_faces};
-use crate::mt::MtInfo;
+use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, UpdateId};
 use crate::refine::{Need, Part};
 use glam::DVec3;
 
@@ -114,7 +114,7 @@ impl<'a> Deviation<'a> {
     /// Measures `mesh` where needs apply. `errors` are those of its tetrahedra.
     pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &TetErrors, asks: &[Ask<'_>]) -> Measured {
         let border = Border::of(mesh, self.info);
-        let largest = errors.of.iter().copied().fold(0.0, f64::max);
+        let largest = errors.codes.iter().copied().max().unwrap_or_default().error();
         let look = Look { of: self, mesh, border, errors, largest, asks };
         let mut found = Measured { worst_ratio: 0.0, failures: Vec::new() };
         look.at_vertices(&mut found);
@@ -127,18 +127,44 @@ impl<'a> Deviation<'a> {
     }
 }
 
-/// The errors of the tetrahedra of a mesh.
+/// What removes the tetrahedra of a mesh, and their errors: those of the updates that remove them, or their own where these are known.
 pub struct TetErrors {
-    /// Numbers for each of them.
-    pub stride: usize,
-    /// For each the largest one of all fields, and that of each field.
-    pub of: Vec<f64>,
+    fields: usize,
+    removers: Vec<Option<UpdateId>>,
+    /// `codes[tet * fields + f]`; zeros for tetrahedra that nothing removes.
+    codes: Vec<ErrorCode>,
 }
 
 impl TetErrors {
+    pub fn of(mt: &impl ApplyUpdates, mesh: &CurrentMesh) -> Self {
+        let fields = mt.info().fields.len();
+        let removers: Vec<Option<UpdateId>> =
+            (0..mesh.tets().len() as u32).map(|t| mt.remover(mesh, t)).collect();
+        let mut codes = Vec::with_capacity(fields * removers.len());
+        for (t, &remover) in (0..).zip(&removers) {
+            let Some(u) = remover else {
+                codes.resize(codes.len() + fields, ErrorCode::ZERO);
+                continue;
+            };
+            let own = mt.quarterings(mesh, t);
+            codes.extend((0..fields).map(|field| mt.own_error(u, field, own)));
+        }
+        Self { fields, removers, codes }
+    }
+
+    pub fn remover(&self, tet: u32) -> Option<UpdateId> {
+        self.removers[tet as usize]
+    }
+
+    /// The errors of a tetrahedron, field by field.
+    pub fn of_tet(&self, tet: u32) -> &[ErrorCode] {
+        &self.codes[tet as usize * self.fields..][..self.fields]
+    }
+
     /// The error of a tetrahedron in one field, or the largest one of all.
-    fn of(&self, tet: u32, field: Option<usize>) -> f64 {
-        self.of[tet as usize * self.stride + field.map_or(0, |field| field + 1)]
+    fn error(&self, tet: u32, field: Option<usize>) -> f64 {
+        let all = self.of_tet(tet);
+        field.map_or_else(|| all.iter().max(), |field| all.get(field)).copied().unwrap_or_default().error()
     }
 }
 
@@ -169,15 +195,17 @@ impl Look<'_> {
         let mut least = vec![f64::INFINITY; points * self.asks.len()];
         for (t, tet) in (0..).zip(self.mesh.tets) {
             let corners = tet.map(|v| self.mesh.positions[v as usize]);
+            let mut places = None;
             self.of.points.near_tet(&corners, |point| {
-                let least = &mut least[point as usize * self.asks.len()..][..self.asks.len()];
                 let asked = |ask: &Ask<'_>| ask.allowed[point as usize] < f64::INFINITY;
                 if !self.asks.iter().any(asked) {
                     return;
                 }
                 let (position, place) =
                     (self.of.points.points()[point as usize], self.of.places[point as usize]);
-                let Some(weights) = weights_at(corners, position, place) else { return };
+                let places = places.get_or_insert_with(|| TetPlaces::new(corners));
+                let Some(weights) = places.weights(position, place) else { return };
+                let least = &mut least[point as usize * self.asks.len()..][..self.asks.len()];
                 let place = Place { tet: t, weights, displaced: 0.0 };
                 for (ask, least) in self.asks.iter().zip(least).filter(|(ask, _)| asked(ask)) {
                     *least = least.min(self.ratio(ask, point, &place));
@@ -217,7 +245,7 @@ impl Look<'_> {
         let tet = self.mesh.tets[place.tet as usize];
         let known = &self.of.values[point as usize * fields.len()..][..fields.len()];
         let named = ask.values().map(|values| values.field).or(ask.need.measured_field());
-        let error = self.errors.of(place.tet, named);
+        let error = self.errors.error(place.tet, named);
         let near = place.displaced <= error;
         if let Some(values) = ask.values() {
             let (info, value) = (&fields[values.field], known[values.field] * fields[values.field].range());
@@ -275,51 +303,53 @@ impl Look<'_> {
         let mut vertices: Vec<u32> = self.border.faces.iter().flat_map(|(_, face)| *face).collect();
         vertices.sort_unstable();
         vertices.dedup();
-        let mut failures = Failures::default();
-        for v in vertices.into_iter().step_by(self.of.stride) {
-            let p = self.of.info.lattice.point(self.mesh.positions[v as usize]);
-            self.compare_distance(p, &self.of.boundary, "of the extracted boundary", &mut failures, found);
-        }
-        failures.end("vertices of the extracted boundary", found);
+        let places = vertices.into_iter().step_by(self.of.stride).map(|v| self.mesh.positions[v as usize]);
+        self.compare_places(places, &self.of.boundary, "the extracted boundary", found);
     }
 
     /// Whether the boundary of the input stays near the extracted one, at its vertices.
     fn at_reference_boundary(&self, found: &mut Measured) {
-        let mut failures = Failures::default();
-        for &v in &self.of.boundary_vertices {
-            let p = self.of.info.lattice.point(self.of.points.points()[v as usize]);
-            self.compare_distance(p, &self.border.triangles, "of the input's boundary", &mut failures, found);
-        }
-        failures.end("vertices of the input's boundary", found);
+        let places = self.of.boundary_vertices.iter().map(|&v| self.of.points.points()[v as usize]);
+        self.compare_places(places, &self.border.triangles, "the input's boundary", found);
     }
 
-    fn compare_distance(
+    fn compare_places(
         &self,
-        p: [f64; 3],
+        places: impl Iterator<Item = [i32; 3]>,
         other: &TriangleGrid,
         what: &str,
-        failures: &mut Failures,
         found: &mut Measured,
     ) {
-        let binding = self.asks.iter().filter(|ask| ask.binds_boundary_at(p));
-        let bound = binding.map(|ask| ask.bound).fold(f64::INFINITY, f64::min);
-        if bound == f64::INFINITY {
-            return;
+        let mut failures = Failures::default();
+        // The next place is likely near the same triangle.
+        let mut first = 0;
+        for place in places {
+            let p = self.of.info.lattice.point(place);
+            let binding = self.asks.iter().filter(|ask| ask.binds_boundary_at(p));
+            let bound = binding.map(|ask| ask.bound).fold(f64::INFINITY, f64::min);
+            if bound == f64::INFINITY {
+                continue;
+            }
+            let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
+            let p = DVec3::from(p);
+            // Where that is no more than elsewhere, it need not be known how near the nearest triangle is.
+            let enough = if bound > 0.0 { allowed * found.worst_ratio.min(1.0) } else { allowed };
+            if let Some(near) = other.any_within(p, enough, first) {
+                first = near;
+                continue;
+            }
+            let distance = other.nearest(p).map_or(f64::INFINITY, |(_, q)| p.distance(q));
+            if bound > 0.0 {
+                found.worst_ratio = found.worst_ratio.max(distance / allowed);
+            }
+            if distance > allowed {
+                let at = p.to_array();
+                failures.add(|| {
+                    format!("vertex of {what} at {at:?} is {distance} from the other, more than {allowed}")
+                });
+            }
         }
-        let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
-        let p = DVec3::from(p);
-        let distance = other.nearest(p).map_or(f64::INFINITY, |(_, q)| p.distance(q));
-        if bound > 0.0 {
-            found.worst_ratio = found.worst_ratio.max(distance / allowed);
-        }
-        if distance > allowed {
-            failures.add(|| {
-                format!(
-                    "vertex {what} at {:?} is {distance} from the other, more than {allowed}",
-                    p.to_array()
-                )
-            });
-        }
+        failures.end(&format!("vertices of {what}"), found);
     }
 }
 

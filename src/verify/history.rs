@@ -1,17 +1,23 @@
 //! Checks that the mesh of a request does not depend on earlier requests, with many requests.
 
+use super::queries::{parallel, perspective, place};
 use super::{Query, VerifyReport, note, satisfy};
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
 use crate::mt::{ApplyUpdates, MtInfo};
 use crate::refine::{Front, Need, Request};
+use glam::DVec3;
 
 /// Requests for values, of all fields together, and for boxes.
 const VALUES: usize = 60;
 const BOXES: usize = 12;
+/// Cameras, and the places that each moves to.
+const WALKS: usize = 8;
+const PLACES: u64 = 4;
 
-/// One in so many requests starts from the reference mesh.
+/// One in so many requests starts from the reference mesh, and one in so many others comes by it.
 const FULL: u32 = 3;
+const THROUGH: u32 = 24;
 
 const ERRORS: [f64; 5] = [0.01, 0.0, 0.003, 0.03, 0.001];
 
@@ -32,9 +38,32 @@ impl Numbers {
     }
 }
 
-/// Isovalues all over the range of each field, values of reference vertices, bands, and boxes, in random order.
-pub fn requests(info: &MtInfo, input: &TetMesh) -> Vec<Query> {
+/// Isovalues all over the range of each field, values of reference vertices, bands, boxes, and cameras that move, in random order.
+pub fn requests(mt: &impl ApplyUpdates, input: &TetMesh) -> Vec<Query> {
     let mut numbers = Numbers(0x9E37_79B9_7F4A_7C15);
+    let mut all: Vec<Vec<Query>> =
+        values(mt.info(), input, &mut numbers).into_iter().map(|one| vec![one]).collect();
+    let whole = Bounds::of(&input.positions);
+    for _ in 0..BOXES {
+        let error = ERRORS[all.len() % ERRORS.len()];
+        let (mut low, mut high) = (whole.min, whole.max);
+        for i in 0..3 {
+            let ends =
+                [numbers.part(), numbers.part()].map(|x| whole.min[i] + x * (whole.max[i] - whole.min[i]));
+            (low[i], high[i]) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        }
+        let need = Need::within(error).inside(Bounds { min: low, max: high });
+        all.push(vec![Query::new(&format!("box {low:?} to {high:?}, error {error}"), need)]);
+    }
+    let sizes = [mt.base().tets.len() as u64, u64::from(mt.info().tetrahedra)];
+    all.extend((0..WALKS).map(|i| walk(i, &whole, sizes, &mut numbers)));
+    for i in (1..all.len()).rev() {
+        all.swap(i, numbers.next() as usize % (i + 1));
+    }
+    all.into_iter().flatten().collect()
+}
+
+fn values(info: &MtInfo, input: &TetMesh, numbers: &mut Numbers) -> Vec<Query> {
     let mut all = Vec::new();
     let each = (VALUES / info.fields.len()).max(2);
     for (f, field) in info.fields.iter().enumerate() {
@@ -55,45 +84,63 @@ pub fn requests(info: &MtInfo, input: &TetMesh) -> Vec<Query> {
             all.push(Query::new(&format!("{name}, error {error}"), need));
         }
     }
-    let whole = Bounds::of(&input.positions);
-    for _ in 0..BOXES {
-        let error = ERRORS[all.len() % ERRORS.len()];
-        let (mut low, mut high) = (whole.min, whole.max);
-        for i in 0..3 {
-            let ends =
-                [numbers.part(), numbers.part()].map(|x| whole.min[i] + x * (whole.max[i] - whole.min[i]));
-            (low[i], high[i]) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        }
-        let need = Need::within(error).inside(Bounds { min: low, max: high });
-        all.push(Query::new(&format!("box {low:?} to {high:?}, error {error}"), need));
-    }
-    for i in (1..all.len()).rev() {
-        all.swap(i, numbers.next() as usize % (i + 1));
-    }
     all
 }
 
-/// Answers each request from the base mesh, and again from the mesh that the one before left, or from the reference mesh.
+/// A camera somewhere, and where it is after some small moves, together with a coarse mesh of the whole; some with a budget that grows
+/// and shrinks. `sizes` are the tetrahedra of the base and of the reference mesh.
+fn walk(i: usize, whole: &Bounds, [base, all]: [u64; 2], numbers: &mut Numbers) -> Vec<Query> {
+    let mut random = |most: f64| DVec3::from([0; 3].map(|_| most * (2.0 * numbers.part() - 1.0)));
+    let (size, viewport) = (whole.diagonal(), [900.0, 600.0]);
+    let mut target = DVec3::from(place(whole, (0.5 + random(0.4)).to_array()));
+    let mut eye = target + random(1.0) * size * [0.3, 1.5][i % 2];
+    let pixels = [0.5, 2.0, 8.0][i % 3];
+    let step = |k: u64| {
+        let seen = match i % 4 {
+            3 => parallel(target, (2.0 + k as f64) / size, viewport),
+            _ => perspective(eye, target - eye, 1.8, viewport),
+        };
+        target += 0.02 * size * random(1.0);
+        eye += 0.05 * size * random(1.0);
+        let request = Request::within(0.3).and(Need::seen(seen, pixels));
+        let most = base + all.saturating_sub(base) / (8 + 4 * (k % 2));
+        let request = if i % 2 == 1 { request.at_most(most as u32) } else { request };
+        Query::new(&format!("place {k} of camera {i}, {pixels} pixels"), request)
+    };
+    (0..PLACES).map(step).collect()
+}
+
+/// Answers each request from the base mesh, and again from the reference mesh or from what requests before it have left. `untouched` is the
+/// base mesh before any request, `base` what is left of others.
 pub fn check(
     mt: &impl ApplyUpdates,
-    base: &Front,
+    [untouched, base]: [&Front; 2],
     queries: &[Query],
     on_progress: &mut dyn FnMut(u32),
     report: &mut VerifyReport,
 ) -> Result<(), String> {
-    let full = Query::new("full refinement", Request::within(0.0));
-    let mut walk = base.clone();
+    if queries.is_empty() {
+        return Ok(());
+    }
+    let all = Query::new("full refinement", Request::within(0.0));
+    // One mesh follows most of the requests, now and then by way of the reference mesh; others begin there.
+    let [mut walk, mut full] = [untouched, base].map(Front::clone);
+    satisfy(mt, &mut full, &all)?;
     for (i, query) in (0..).zip(queries) {
         on_progress(i);
         let mut front = base.clone();
         satisfy(mt, &mut front, query)?;
-        if i % FULL == 0 {
-            satisfy(mt, &mut walk, &full)?;
+        let wanted = (front.mesh().hash(), front.mesh().tet_count());
+        drop(front);
+        let mut other = (i % FULL == 0).then(|| full.clone());
+        let other = other.as_mut().unwrap_or(&mut walk);
+        if i % THROUGH == 1 {
+            satisfy(mt, other, &all)?;
         }
-        satisfy(mt, &mut walk, query)?;
+        satisfy(mt, other, query)?;
         report.queries += 1;
-        if walk.mesh().hash() != front.mesh().hash() {
-            let [here, there] = [&front, &walk].map(|front| front.mesh().tet_count());
+        if other.mesh().hash() != wanted.0 {
+            let [here, there] = [wanted.1, other.mesh().tet_count()];
             let from = if i % FULL == 0 { "the reference mesh" } else { "another one" };
             let failure = format!(
                 "the mesh depends on what was asked for before: {here} tetrahedra from the base mesh, {there} from {from}"

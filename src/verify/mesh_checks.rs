@@ -1,7 +1,7 @@
 //! Checks that a mesh is valid and conforming, from plain arrays, by sorting and exact orientation only.
 
 use crate::geom::{Groups, orient3d};
-use crate::mesh::{FACES, NONE, boundary_faces, stars};
+use crate::mesh::{FACES, NONE, boundary_faces};
 use crate::mt::CurrentMesh;
 
 /// An extracted mesh as plain arrays.
@@ -28,16 +28,36 @@ pub struct Shape {
 
 impl Shape {
     pub fn of(reference: &PlainReference<'_>) -> Result<Self, String> {
-        let around = Around::new(reference.positions.len(), reference.tets)?;
+        let mut around = Around::new(reference.positions.len(), reference.tets)?;
         let mut faces = Vec::new();
         let mut count = Counts::default();
-        (0..reference.positions.len() as u32).for_each(|v| count.add(&around.at(v, &mut faces), &faces));
+        (0..reference.positions.len() as u32).for_each(|v| count.add(around.at(v, &mut faces), &faces));
         Ok(Self { euler: count.euler(reference.positions.len(), reference.tets.len()) })
     }
 }
 
-/// A face at its least vertex: the two others, ascending, the side its tetrahedron is on, and where it is: `4 · tet + face`.
-type Face = ([u32; 2], bool, u32);
+/// A face at its least vertex.
+#[derive(Clone, Copy)]
+struct Face {
+    /// The two other vertices, the smaller one in the upper half.
+    others: u64,
+    /// Which side its tetrahedron is on.
+    side: bool,
+    /// Where it is: `4 · tet + face`.
+    at: u32,
+}
+
+impl Face {
+    /// Face number `at` of a mesh, and its least vertex.
+    fn of(tets: &[[u32; 4]], at: u32) -> (u32, Self) {
+        let tet = tets[at as usize / 4];
+        let [a, b, c] = FACES[at as usize % 4].map(|corner| tet[corner]);
+        let side = (a > b) ^ (b > c) ^ (a > c);
+        let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+        let between = a ^ b ^ c ^ least ^ most;
+        (least, Self { others: u64::from(between) << 32 | u64::from(most), side, at })
+    }
+}
 
 impl<'a> PlainMesh<'a> {
     /// The mesh, which must be packed.
@@ -49,11 +69,11 @@ impl<'a> PlainMesh<'a> {
     pub fn check(&self, reference: &Shape) -> Result<(), String> {
         self.check_vertices()?;
         self.check_orientation()?;
-        let around = Around::new(self.positions.len(), self.tets)?;
+        let mut around = Around::new(self.positions.len(), self.tets)?;
         let (mut faces, mut boundary) = (Vec::new(), Vec::new());
         let mut count = Counts::default();
         for v in 0..self.positions.len() as u32 {
-            count.add(&around.at(v, &mut faces), &faces);
+            count.add(around.at(v, &mut faces), &faces);
             self.check_faces(v, &faces, &mut boundary)?;
         }
         check_closed(&boundary)?;
@@ -96,11 +116,13 @@ impl<'a> PlainMesh<'a> {
     /// Compares adjacency with the sorted faces of least vertex `v`. Appends those of the boundary.
     fn check_faces(&self, v: u32, faces: &[Face], boundary: &mut Vec<[u32; 3]>) -> Result<(), String> {
         let across = |at: u32| self.neighbors[at as usize / 4][at as usize % 4];
-        for group in faces.chunk_by(|a, b| a.0 == b.0) {
+        for group in faces.chunk_by(|a, b| a.others == b.others) {
             match group {
-                &[([b, c], _, at)] if across(at) == NONE => boundary.push([v, b, c]),
-                &[(.., at)] => return Err(format!("tetrahedron {} has a neighbour too many", at / 4)),
-                &[(_, side, a), (_, other_side, b)] => {
+                &[Face { others, at, .. }] if across(at) == NONE => {
+                    boundary.push([v, (others >> 32) as u32, others as u32]);
+                }
+                &[Face { at, .. }] => return Err(format!("tetrahedron {} has a neighbour too many", at / 4)),
+                &[Face { side, at: a, .. }, Face { side: other_side, at: b, .. }] => {
                     if side == other_side {
                         return Err(format!("tetrahedra {} and {} overlap at a face", a / 4, b / 4));
                     }
@@ -108,7 +130,7 @@ impl<'a> PlainMesh<'a> {
                         return Err(format!("tetrahedra {} and {} are not neighbours", a / 4, b / 4));
                     }
                 }
-                [(.., at), ..] => {
+                [Face { at, .. }, ..] => {
                     return Err(format!("a face of tetrahedron {} is shared by {}", at / 4, group.len()));
                 }
                 [] => {}
@@ -123,10 +145,16 @@ impl<'a> PlainMesh<'a> {
     }
 }
 
-/// The tetrahedra around each vertex: checks vertex by vertex need no list of all faces or edges.
+/// What is around each vertex: checks vertex by vertex need no list of all faces or edges.
 struct Around<'a> {
     tets: &'a [[u32; 4]],
-    stars: Groups,
+    /// The faces of which a vertex is the least one, by their numbers `4 · tet + face`.
+    faces: Groups,
+    /// Edges from a vertex to a larger one that may be in none of these faces: those between the two largest vertices of each
+    /// tetrahedron.
+    edges: Groups,
+    /// For each vertex the last one that was found to share an edge with it.
+    seen: Vec<u32>,
 }
 
 impl<'a> Around<'a> {
@@ -137,30 +165,28 @@ impl<'a> Around<'a> {
         if let Some(v) = tets.iter().flatten().find(|v| **v as usize >= vertices) {
             return Err(format!("there is no vertex {v}"));
         }
-        Ok(Self { tets, stars: stars(vertices, tets) })
+        let faces = Groups::new(vertices, |add| {
+            (0..4 * tets.len() as u32).for_each(|at| add(Face::of(tets, at).0 as usize, at));
+        });
+        let edges = Groups::new(vertices, |add| {
+            tets.iter().for_each(|tet| {
+                let mut tet = *tet;
+                tet.sort_unstable();
+                add(tet[2] as usize, tet[3]);
+            });
+        });
+        Ok(Self { tets, faces, edges, seen: vec![NONE; vertices] })
     }
 
-    /// Gives the vertices that have larger numbers and share an edge with `v`, and sorted the faces of which it is the least vertex.
-    fn at(&self, v: u32, faces: &mut Vec<Face>) -> Vec<u32> {
+    /// Gives how many vertices have larger numbers and share an edge with `v`, and sorted the faces of which it is the least vertex.
+    fn at(&mut self, v: u32, faces: &mut Vec<Face>) -> usize {
         faces.clear();
-        let mut larger = Vec::new();
-        for &t in self.stars.of(v as usize) {
-            let tet = self.tets[t as usize];
-            larger.extend(tet.iter().filter(|&&w| w > v));
-            for (i, corners) in FACES.iter().enumerate() {
-                let [a, b, c] = corners.map(|j| tet[j]);
-                let odd = (a > b) ^ (b > c) ^ (a > c);
-                let mut face = [a, b, c];
-                face.sort_unstable();
-                if face[0] == v {
-                    faces.push(([face[1], face[2]], odd, 4 * t + i as u32));
-                }
-            }
-        }
-        larger.sort_unstable();
-        larger.dedup();
-        faces.sort_unstable();
-        larger
+        faces.extend(self.faces.of(v as usize).iter().map(|&at| Face::of(self.tets, at).1));
+        faces.sort_unstable_by_key(|face| face.others);
+        let seen = &mut self.seen;
+        let mut is_new = |w: u32| std::mem::replace(&mut seen[w as usize], v) != v;
+        let ends = faces.iter().flat_map(|face| [(face.others >> 32) as u32, face.others as u32]);
+        ends.chain(self.edges.of(v as usize).iter().copied()).filter(|&w| is_new(w)).count()
     }
 }
 
@@ -172,9 +198,9 @@ struct Counts {
 }
 
 impl Counts {
-    fn add(&mut self, larger: &[u32], faces: &[Face]) {
-        self.edges += larger.len() as i64;
-        self.faces += faces.chunk_by(|a, b| a.0 == b.0).count() as i64;
+    fn add(&mut self, larger: usize, faces: &[Face]) {
+        self.edges += larger as i64;
+        self.faces += faces.chunk_by(|a, b| a.others == b.others).count() as i64;
     }
 
     fn euler(&self, vertices: usize, tets: usize) -> i64 {

@@ -21,9 +21,11 @@
 //!   its tetrahedron, so every part of an isosurface is present and as accurate as requested.
 //! - **Answers**: `satisfied` and the bounds are true, budgets are kept, a larger budget never has a larger excess, and
 //!   the same request gives the same mesh after any other request and in any steps; repeating it changes nothing.
-//! - **History**: a hundred more requests for values all over the range and for boxes, in random order, each from the base mesh and
-//!   from others.
+//! - **History**: a hundred more requests, for values all over the range, for boxes and for cameras that move, some with budgets, in
+//!   random order, each from the base mesh and from others.
 //! - **Steps**: between them the mesh is valid and within the budget.
+//!
+//! [`run_shown`] checks what a session makes of its meshes.
 
 mod deviation;
 mod history;
@@ -33,11 +35,13 @@ mod points;
 mod queries;
 mod same;
 mod samples;
+mod shown;
 
 pub use samples::{SampleRequest, run_request, samples};
+pub use shown::run_shown;
 
 use crate::mesh::TetMesh;
-use crate::mt::{ApplyUpdates, ErrorCode, UpdateId, check_errors};
+use crate::mt::{ApplyUpdates, ErrorCode, check_errors};
 use crate::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetData};
 use deviation::{Deviation, TetErrors};
 use history::Numbers;
@@ -56,6 +60,17 @@ pub struct VerifyReport {
     pub worst_error_ratio: f64,
     /// Failed checks: the request, the place and the numbers. At most [`MAX_FAILURES`].
     pub failures: Vec<String>,
+}
+
+impl VerifyReport {
+    /// Adds what other checks of the same MT have found.
+    pub fn add(&mut self, other: Self) {
+        self.valid &= other.valid;
+        self.queries += other.queries;
+        self.worst_error_ratio = self.worst_error_ratio.max(other.worst_error_ratio);
+        self.failures.extend(other.failures);
+        self.failures.truncate(MAX_FAILURES);
+    }
 }
 
 /// No more failures than this are described.
@@ -80,7 +95,7 @@ pub fn run<M: ApplyUpdates>(
 ) -> VerifyReport {
     let plan = |input: &TetMesh| Plan {
         queries: queries::of(mt, input),
-        histories: history::requests(mt.info(), input),
+        histories: history::requests(mt, input),
         vertices: usize::MAX,
     };
     with(mt, input, reference, &plan, on_progress)
@@ -123,7 +138,7 @@ pub fn run_sample<M: ApplyUpdates>(
 ) -> VerifyReport {
     let plan = |input: &TetMesh| Plan {
         queries: sample.of(queries::of(mt, input)),
-        histories: sample.of(history::requests(mt.info(), input)),
+        histories: sample.of(history::requests(mt, input)),
         vertices: sample.vertices,
     };
     with(mt, input, reference, &plan, on_progress)
@@ -185,8 +200,8 @@ fn verify<M: ApplyUpdates>(
     report: &mut VerifyReport,
 ) -> Result<(), String> {
     let deviation = Deviation::new(mt.info(), input, *vertices)?;
-    let base = fresh(mt)?;
-    let reference = check_full_circle(mt, &deviation, report)?;
+    let untouched = fresh(mt)?;
+    let (reference, base) = check_full_circle(mt, &deviation, report)?;
     check_order(mt, report);
     let steps = (2 * queries.len() + histories.len()) as u32;
     let mut hashes = Vec::with_capacity(queries.len());
@@ -201,10 +216,11 @@ fn verify<M: ApplyUpdates>(
         report.queries += 1;
     }
     check_monotone(queries, &excesses, report);
-    let walk = Walk { mt, base: &base, shape: &reference, numbers: Numbers(1) };
+    // From a mesh that has never been refined: what others remember of updates must not count either.
+    let walk = Walk { mt, base: &untouched, shape: &reference, numbers: Numbers(1) };
     let first = queries.len() as u32;
     walk.run(queries, &hashes, &mut |i| on_progress(first + i, steps), report)?;
-    history::check(mt, &base, histories, &mut |i| on_progress(2 * first + i, steps), report)
+    history::check(mt, [&untouched, &base], histories, &mut |i| on_progress(2 * first + i, steps), report)
 }
 
 /// Of two requests that differ in their budgets alone, the one with the larger budget must not have a larger excess.
@@ -238,12 +254,13 @@ fn note(report: &mut VerifyReport, place: &dyn std::fmt::Display, failure: &str)
     }
 }
 
-/// Refines the base mesh to the reference mesh and coarsens it again. Returns the properties that every mesh must have.
+/// Refines the base mesh to the reference mesh and coarsens it again. Returns the properties that every mesh must have, and the base
+/// mesh that is left: it remembers what updates do, so that requests from it take less time.
 fn check_full_circle(
     mt: &impl ApplyUpdates,
     deviation: &Deviation<'_>,
     report: &mut VerifyReport,
-) -> Result<mesh_checks::Shape, String> {
+) -> Result<(mesh_checks::Shape, Front), String> {
     let mut front = fresh(mt)?;
     let base = front.mesh().hash();
     let full = Query::new("full refinement", Request::within(0.0));
@@ -261,7 +278,8 @@ fn check_full_circle(
     if front.applied_count() != 0 || front.mesh().hash() != base {
         note(report, &none, "what is left is not the base mesh");
     }
-    mesh_checks::Shape::of(&deviation.reference()).map_err(|failure| format!("the input: {failure}"))
+    let shape = mesh_checks::Shape::of(&deviation.reference());
+    Ok((shape.map_err(|failure| format!("the input: {failure}"))?, front))
 }
 
 /// Checks that errors do not grow from an update to those that depend on it; refinement relies on that.
@@ -362,6 +380,12 @@ struct Case<'a, M> {
     outcome: &'a Outcome,
 }
 
+/// The mesh that a query was answered with, and what its MT tells of it.
+struct Told<'a> {
+    mesh: &'a PlainMesh<'a>,
+    errors: &'a TetErrors,
+}
+
 /// Errors that are smaller than this, in whatever unit, are judged as this: ratios to 0 mean nothing.
 const LEAST: f64 = 1.0 / (1_u64 << 20) as f64;
 
@@ -378,18 +402,20 @@ impl<M: ApplyUpdates> Case<'_, M> {
         if let Err(failure) = mesh.check(reference) {
             return note(report, self.query, &failure);
         }
-        let checks = [self.check_answer(&mesh), check_budget(self.query, &mesh, base)];
+        let errors = TetErrors::of(self.mt, mesh.mesh);
+        let told = Told { mesh: &mesh, errors: &errors };
+        let checks = [self.check_answer(&told), check_budget(self.query, &mesh, base)];
         checks.iter().filter_map(|c| c.as_ref().err()).for_each(|failure| note(report, self.query, failure));
         let needs = &self.query.request.needs;
-        let bounds: Vec<f64> = needs.iter().map(|need| self.bound(need, &mesh)).collect();
+        let bounds: Vec<f64> = needs.iter().map(|need| self.bound(need, &told)).collect();
         let asks = deviation.asks(needs, &bounds);
-        let measured = deviation.measure(&mesh, &self.errors(&mesh), &asks);
+        let measured = deviation.measure(&mesh, &errors, &asks);
         report.worst_error_ratio = report.worst_error_ratio.max(measured.worst_ratio);
         measured.failures.iter().for_each(|failure| note(report, self.query, failure));
     }
 
     /// What is guaranteed where a need counts, in its unit.
-    fn bound(&self, need: &Need, mesh: &PlainMesh<'_>) -> f64 {
+    fn bound(&self, need: &Need, told: &Told<'_>) -> f64 {
         let reported = self.outcome.error.error();
         match need.part {
             Part::View(_) | Part::Transfer(_) => {
@@ -397,66 +423,43 @@ impl<M: ApplyUpdates> Case<'_, M> {
                     return need.error;
                 }
                 let judged = Need { error: need.error.max(LEAST), ..need.clone() };
-                judged.error * self.largest(mesh, judged.into()).1
+                judged.error * self.largest(told, judged.into()).1
             }
             _ if self.outcome.satisfied => reported.min(need.error),
             _ if self.query.request.needs.len() == 1 => reported,
-            _ => self.largest(mesh, need.clone().into()).0.max(ErrorCode::at_most(need.error)).error(),
+            _ => self.largest(told, need.clone().into()).0.max(ErrorCode::at_most(need.error)).error(),
         }
-    }
-
-    /// The error of each tetrahedron: that of the update which removes it, or its own where that is known.
-    fn errors(&self, mesh: &PlainMesh<'_>) -> TetErrors {
-        let fields = self.mt.info().fields.len();
-        let mut errors = TetErrors { stride: fields + 1, of: Vec::new() };
-        for t in 0..mesh.tets.len() as u32 {
-            match self.mt.remover(mesh.mesh, t) {
-                None => errors.of.resize(errors.of.len() + fields + 1, 0.0),
-                Some(u) => {
-                    let own = self.own_errors(mesh, t, u);
-                    errors.of.push(own.iter().max().copied().unwrap_or_default().error());
-                    errors.of.extend(own.iter().map(|error| error.error()));
-                }
-            }
-        }
-        errors
-    }
-
-    /// The errors of tetrahedron `t`, which update `u` removes, field by field.
-    fn own_errors(&self, mesh: &PlainMesh<'_>, t: u32, u: UpdateId) -> Vec<ErrorCode> {
-        let own = self.mt.quarterings(mesh.mesh, t);
-        (0..self.mt.info().fields.len()).map(|field| self.mt.own_error(u, field, own)).collect()
     }
 
     /// The largest error and the largest excess of all tetrahedra that violate a request; 0 and 1 if none does.
-    fn largest(&self, mesh: &PlainMesh<'_>, request: Request) -> (ErrorCode, f64) {
+    fn largest(&self, told: &Told<'_>, request: Request) -> (ErrorCode, f64) {
         let criterion = LodCriterion::new(self.mt.info(), &request);
         let mut largest = (ErrorCode::ZERO, 1.0);
-        for (t, tet) in (0..).zip(mesh.tets) {
-            let Some(update) = self.mt.remover(mesh.mesh, t) else { continue };
-            let corners = tet.map(|v| mesh.positions[v as usize]);
-            let levels = |field: usize| tet.map(|v| mesh.mesh.levels(v)[field]);
-            let errors = self.own_errors(mesh, t, update);
+        for (t, tet) in (0..).zip(told.mesh.tets) {
+            let Some(update) = told.errors.remover(t) else { continue };
+            let corners = tet.map(|v| told.mesh.positions[v as usize]);
+            let levels = |field: usize| tet.map(|v| told.mesh.mesh.levels(v)[field]);
+            let errors = told.errors.of_tet(t);
             let error = errors.iter().max().copied().unwrap_or_default();
-            let look = TetData { corners: &corners, levels: &levels, error, errors: &errors, update };
-            let verdict = criterion.rank(&look);
-            if verdict.violates() {
+            let look = TetData { corners: &corners, levels: &levels, error, errors, update };
+            // What it exceeds by costs more, and is asked for only where it exceeds at all.
+            if criterion.judge(&look).violates() {
                 let error = look.error_of(criterion.field());
-                largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
+                largest = (largest.0.max(error), f64::max(largest.1, criterion.rank(&look).excess));
             }
         }
         largest
     }
 
     /// Checks the statistics of refinement.
-    fn check_answer(&self, mesh: &PlainMesh<'_>) -> Result<(), String> {
+    fn check_answer(&self, told: &Told<'_>) -> Result<(), String> {
         let request = &self.query.request;
         let Outcome { error: reported, excess, satisfied, done, .. } = *self.outcome;
         if !done {
             return Err("stopped although nothing stood in the way".to_owned());
         }
         let (_, violation) =
-            self.largest(mesh, Request { needs: request.needs.clone(), ..Request::default() });
+            self.largest(told, Request { needs: request.needs.clone(), ..Request::default() });
         if satisfied != (violation <= 1.0) || satisfied && excess > 1.0 {
             let answer = if satisfied { "satisfied" } else { "not satisfied" };
             return Err(format!("reported as {answer}, with an excess of {violation}"));
@@ -470,7 +473,7 @@ impl<M: ApplyUpdates> Case<'_, M> {
         let of_field = |need: &&Need| !matches!(need.part, Part::View(_) | Part::Transfer(_));
         let exact = |need: &Need| Need { error: 0.0, ..need.clone() };
         // Each need by itself: they may measure different fields.
-        let alone = |need: Need| self.largest(mesh, need.into()).0;
+        let alone = |need: Need| self.largest(told, need.into()).0;
         let needs = request.needs.iter().filter(of_field).map(exact);
         let largest = needs.map(alone).fold(ErrorCode::ZERO, ErrorCode::max);
         if largest > reported {

@@ -194,7 +194,7 @@ impl Queries {
 }
 
 /// A place in a box, by fractions of its sides.
-fn place(whole: &Bounds, part: [f64; 3]) -> [f64; 3] {
+pub fn place(whole: &Bounds, part: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| whole.min[i] + part[i] * (whole.max[i] - whole.min[i]))
 }
 
@@ -246,21 +246,24 @@ fn views(input: &TetMesh) -> [(&'static str, View); 3] {
     let way = DVec3::new(0.6, -0.75, 0.3);
     let far = perspective(at([0.5; 3]) - 1.1 * size * way, way, 2.2, viewport);
     let near = perspective(at([0.45, 0.5, 0.3]), DVec3::new(0.3, 0.4, 0.5), 1.5, viewport);
-    let [x, y, z] = (at([0.7, 0.4, 0.5]) * 6.0 / size).to_array();
-    let scale = 6.0 / size;
-    // Looks along z: columns.
-    let parallel = [
+    let parallel = parallel(at([0.7, 0.4, 0.5]), 6.0 / size, viewport);
+    [("view from outside", far), ("view from inside", near), ("parallel view", parallel)]
+}
+
+/// A camera without perspective that looks along z at a point; lengths are multiplied by `scale`.
+pub fn parallel(centre: DVec3, scale: f64, viewport: [f64; 2]) -> View {
+    let [x, y, z] = (centre * scale).to_array();
+    let columns = [
         [scale, 0.0, 0.0, 0.0],
         [0.0, 1.5 * scale, 0.0, 0.0],
         [0.0, 0.0, scale, 0.0],
         [-x, -1.5 * y, -z, 1.0],
     ];
-    let parallel = View { matrix: std::array::from_fn(|i| parallel[i / 4][i % 4]), viewport };
-    [("view from outside", far), ("view from inside", near), ("parallel view", parallel)]
+    View { matrix: std::array::from_fn(|i| columns[i / 4][i % 4]), viewport }
 }
 
 /// A camera at `eye` that looks along `way`, z up; `zoom` is the distance at which the picture is 2 units high.
-fn perspective(eye: DVec3, way: DVec3, zoom: f64, viewport: [f64; 2]) -> View {
+pub fn perspective(eye: DVec3, way: DVec3, zoom: f64, viewport: [f64; 2]) -> View {
     let forward = way.normalize();
     let right = forward.cross(DVec3::Z).normalize();
     let up = right.cross(forward);

@@ -1,7 +1,7 @@
 //! Axes of a box on the screen: which of its edges carry ticks, where the labels go, and a scale bar.
 
 use crate::geom::{Bounds, Camera, Projection};
-use crate::view::ticks::{Tick, linear_ticks, nice_below};
+use crate::view::ticks::{Tick, end_ticks, linear_ticks, nice_below};
 use glam::{DVec2, DVec3, DVec4};
 
 /// An edge is left for another one only if that lies better by so much, in halves of the screen's height.
@@ -78,7 +78,7 @@ pub struct BoxAxis {
     /// the same in both directions: a label that is so many pixels away from its tick is at the tick plus
     /// this direction times the pixels (y upwards).
     pub outward: DVec2,
-    /// The ticks on the screen, ascending.
+    /// The ticks on the screen, ascending: round numbers, and the ends of the edge.
     pub ticks: Vec<AxisTick>,
 }
 
@@ -159,13 +159,28 @@ pub fn box_axis(
         return None;
     }
     let most = if spacing > 0.0 { (length / spacing).min(MOST_TICKS) } else { MOST_TICKS };
-    let ticks = linear_ticks([at(start)[edge.axis], at(end)[edge.axis]], most as usize + 1);
-    let placed = ticks.into_iter().filter_map(|tick| {
+    let place = |tick: Tick| {
         let mut position = from;
         position[edge.axis] = tick.value;
         Some(AxisTick { screen: camera.project(position, aspect)?, position, tick })
-    });
-    let ticks = placed.collect();
+    };
+    let limits = end_ticks([from[edge.axis], to[edge.axis]], false).filter(|_| most >= 1.0);
+    let seen = [start == 0.0, end == 1.0];
+    let [low, high] = match limits {
+        Some([low, high]) => {
+            [seen[0].then_some(low), seen[1].then_some(high)].map(|tick| tick.and_then(place))
+        }
+        None => [None, None],
+    };
+    let left = (most as usize + 1).saturating_sub(low.iter().chain(&high).count());
+    let round = linear_ticks([at(start)[edge.axis], at(end)[edge.axis]], left);
+    // Where an end is, there is no room for a round number.
+    let is_free = |tick: &AxisTick| {
+        let near = |end: &AxisTick| ((end.screen - tick.screen) * square).length() < 0.6 * spacing;
+        !low.iter().chain(&high).any(near)
+    };
+    let inner: Vec<_> = round.into_iter().filter_map(place).filter(is_free).collect();
+    let ticks = low.into_iter().chain(inner).chain(high).collect();
     let outward = side(bounds, camera, aspect, ends[0] * square, along.perp() / length);
     Some(BoxAxis { edge, ends, outward, ticks })
 }
@@ -307,6 +322,26 @@ mod tests {
                 assert!(axis.ticks.len() as f64 <= length / 0.15 + 1.0);
             }
         }
+    }
+
+    #[test]
+    fn ends_that_are_on_the_screen_have_ticks() {
+        let (mut seen, mut apart) = (0, f64::INFINITY);
+        for camera in cameras() {
+            for axis in axes(&camera).filter(|axis| axis.ticks.len() > 2) {
+                let ends = [BOX.min, BOX.max].map(|corner| corner[axis.edge.axis]);
+                let has = |value: f64| axis.ticks.iter().any(|tick| tick.tick.value == value);
+                for (end, place) in ends.into_iter().zip(axis.edge.ends(&BOX)) {
+                    let is_seen = camera.project(place, ASPECT).is_some_and(|p| p.abs().max_element() < 1.0);
+                    assert_eq!(has(end), is_seen, "{axis:?}");
+                    seen += usize::from(is_seen);
+                }
+                let places: Vec<_> =
+                    axis.ticks.iter().map(|tick| tick.screen * DVec2::new(ASPECT, 1.0)).collect();
+                apart = places.windows(2).map(|pair| pair[0].distance(pair[1])).fold(apart, f64::min);
+            }
+        }
+        assert!(seen > 1000 && apart > 0.01, "{seen} {apart}");
     }
 
     #[test]

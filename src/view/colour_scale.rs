@@ -1,6 +1,6 @@
 //! Which colour a value of a field has.
 
-use crate::view::{Colormap, Histogram, Tick, linear_ticks, log_ticks};
+use crate::view::{Colormap, Histogram, Tick, end_ticks, linear_ticks, log_ticks};
 use thiserror::Error;
 
 /// A colour map over a range of values: which colour a value has.
@@ -113,10 +113,21 @@ impl ColourScale {
         table
     }
 
-    /// At most `count` ticks for a bar with these colours, ascending. A tick belongs at the
-    /// [`fraction`](ColourScale::fraction) of its value.
+    /// At most `count` ticks for a bar with these colours, ascending: the ends of the range, and round numbers with room between
+    /// them. A tick belongs at the [`fraction`](ColourScale::fraction) of its value.
     pub fn ticks(&self, count: usize) -> Vec<Tick> {
-        if self.is_log { log_ticks(self.range, count) } else { linear_ticks(self.range, count) }
+        let round =
+            |count| if self.is_log { log_ticks(self.range, count) } else { linear_ticks(self.range, count) };
+        let Some([low, high]) = end_ticks(self.range, self.is_log).filter(|_| count > 1) else {
+            return round(count);
+        };
+        let room = 0.5 / count as f64;
+        let is_between = |tick: &Tick| (room..=1.0 - room).contains(&self.fraction(tick.value));
+        // As many as there is room for beside the ends.
+        let counts = (count - 2..=count).rev();
+        let mut inner = counts.map(|count| round(count).into_iter().filter(is_between).collect::<Vec<_>>());
+        let inner = inner.find(|inner| inner.len() + 2 <= count).unwrap_or_default();
+        [low].into_iter().chain(inner).chain([high]).collect()
     }
 
     /// The scale with the smallest range around its own that has `middle` at fraction 0.5: for diverging
@@ -162,6 +173,22 @@ mod tests {
 
     const LOG: ColourScale =
         ColourScale { map: VIRIDIS, range: [0.01, 100.0], is_reversed: false, is_log: true };
+
+    #[test]
+    fn ticks_begin_and_end_with_the_range() {
+        let labels = |scale: ColourScale, count| {
+            scale.ticks(count).into_iter().map(|tick| tick.label).collect::<Vec<_>>()
+        };
+        let linear = ColourScale::new(VIRIDIS, [-0.013, 1.274]).unwrap();
+        assert_eq!(labels(linear, 6), ["-0.013", "0.25", "0.50", "0.75", "1.00", "1.274"]);
+        assert_eq!(labels(linear, 1), ["0.0"]);
+        assert_eq!(labels(LOG, 6), ["0.01", "0.1", "1", "10", "100"]);
+        assert_eq!(labels(ColourScale::new(VIRIDIS, [3.0, 3.0]).unwrap(), 6), ["3"]);
+        assert_eq!(
+            labels(ColourScale::new(VIRIDIS, [1.7e9, 1.7e9 + 3.0]).unwrap(), 6).first().unwrap(),
+            "1700000000"
+        );
+    }
 
     #[test]
     fn values_are_held_and_go_back() {

@@ -41,7 +41,7 @@ pub use slice::{Plane, Slice};
 pub use solids::Solids;
 pub use stats::FieldStats;
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
-pub use ticks::{Tick, linear_ticks, log_ticks};
+pub use ticks::{Tick, end_ticks, linear_ticks, log_ticks};
 pub use triangles::Triangles;
 pub use tubes::{TubeEnd, TubeOptions};
 pub use volume::{Light, Medium};

@@ -55,6 +55,28 @@ pub fn linear_ticks(range: [f64; 2], count: usize) -> Vec<Tick> {
     values.into_iter().zip(labels_of(decimals)).map(|(value, label)| Tick { value, label }).collect()
 }
 
+/// The ends of a range, in ascending order, with as many digits as tell thousandths of it apart, or of a logarithmic axis with
+/// six digits: what round ticks leave open.
+///
+/// None if they are the same, infinite or NaN.
+///
+/// ```
+/// let ends = tetralod::view::end_ticks([1.0 / 3.0, 17.0], false).expect("a range");
+/// assert_eq!(ends.map(|tick| tick.label), ["0.3", "17.0"]);
+/// ```
+pub fn end_ticks(range: [f64; 2], is_log: bool) -> Option<[Tick; 2]> {
+    let [low, high] = ascending(range).filter(|[low, high]| low < high)?;
+    if is_log {
+        return Some([low, high].map(|value| Tick { value, label: Decimal::near(value).label() }));
+    }
+    let exponent = (high / 2.0 - low / 2.0).max(SMALLEST).log10().floor() as i32 - 2;
+    let exponent = exponent.max(Decimal::last_exponent(low.abs().max(high.abs())));
+    let rounded =
+        [low, high].map(|value| Decimal { digits: scaled(value, -exponent).round() as i64, exponent });
+    let mut labels = labels_of(rounded.to_vec()).into_iter();
+    Some([low, high].map(|value| Tick { value, label: labels.next().unwrap_or_default() }))
+}
+
 /// At most `count` ticks in a range of positive numbers for a logarithmic axis, ascending: powers of ten,
 /// with 2 and 5 times these if there is room, or only every second, third or further power if there is none.
 ///
@@ -158,6 +180,11 @@ impl Decimal {
         }
         let exponent = value.abs().log10().floor() as i32 - (DIGITS - 1);
         Self { digits: scaled(value, -exponent).round() as i64, exponent }.shortened()
+    }
+
+    /// The place of the last digit that a number has in double precision.
+    fn last_exponent(value: f64) -> i32 {
+        value.log10().floor() as i32 - 15
     }
 
     /// The same number without zeros at its end.
@@ -293,6 +320,23 @@ mod tests {
         assert_eq!(log_ticks([0.0, 10.0], 5), []);
         assert!(!log_ticks([5e-324, f64::MAX], 5).is_empty());
         assert_eq!(labels(&log_ticks([4.0, 4.0], 5)), ["4"]);
+    }
+
+    #[test]
+    fn ends_have_the_digits_that_tell_thousandths_of_the_range_apart() {
+        let ends = |low, high| end_ticks([low, high], false).map(|ends| ends.map(|tick| tick.label));
+        let words = |low: &str, high: &str| Some([low.to_owned(), high.to_owned()]);
+        assert_eq!(ends(0.0, 10.0), words("0", "10"));
+        assert_eq!(ends(-1.0 / 3.0, 0.65), words("-0.333", "0.650"));
+        assert_eq!(ends(5_800_123.4567, 5_800_158.4567), words("5800123.5", "5800158.5"));
+        assert_eq!(ends(1.7e9, 1.7e9 + 3.0), words("1700000000", "1700000003"));
+        assert_eq!(ends(101_325.0, 101_325.000_1), words("101325.0000", "101325.0001"));
+        assert_eq!(ends(-1e-9, 1.0), words("0", "1"));
+        assert_eq!(ends(1e-12, 3.25e-12), words("1.00e-12", "3.25e-12"));
+        assert_eq!((ends(2.0, 2.0), ends(f64::NAN, 1.0)), (None, None));
+        let logarithmic = end_ticks([1.0 / 3.0 * 1e-6, 2e6], true).map(|ends| ends.map(|tick| tick.label));
+        assert_eq!(logarithmic, words("3.33333e-7", "2e6"));
+        assert!(ends(-f64::MAX, f64::MAX).is_some() && ends(0.0, 5e-324).is_some());
     }
 
     #[test]

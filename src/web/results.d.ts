@@ -167,7 +167,10 @@ export interface MeshDelta extends Stored {
   neighbors: Uint32Array;
 }
 
-/** A conforming tetrahedral mesh with one value per vertex. */
+/**
+ * A conforming tetrahedral mesh with one value per vertex: what `Viewer.mesh` gives. What `refine` gives (`RefineResult`) is a `Mesh`
+ * with what has changed in it and the numbers.
+ */
 export interface Mesh extends Stored {
   /** Three coordinates a vertex, relative to `origin`. */
   positions: Float32Array;
@@ -177,6 +180,4 @@ export interface Mesh extends Stored {
   tets: Uint32Array;
   /** Four tetrahedra a tetrahedron: the i-th lies across from its i-th vertex; 0xffffffff at the boundary. */
   neighbors: Uint32Array;
-  /** Where this mesh differs from the one that was handed out before. */
-  changes: MeshChanges;
 }

@@ -29,7 +29,7 @@ extern "C" {
     #[wasm_bindgen(typescript_type = "CoreStats")]
     pub type JsStats;
     /// A mesh as typed arrays.
-    #[wasm_bindgen(typescript_type = "Mesh")]
+    #[wasm_bindgen(typescript_type = "Mesh & { changes: MeshChanges }")]
     pub type JsMesh;
     /// What has changed in a mesh, as typed arrays.
     #[wasm_bindgen(typescript_type = "MeshDelta")]

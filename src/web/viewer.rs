@@ -31,7 +31,7 @@ const REACH: f64 = 18.0;
 const SAMPLES: u32 = 8;
 
 /// Ticks of the legend, at most.
-const TICKS: usize = 6;
+const TICKS: usize = 7;
 
 /// An MT and its picture on a canvas.
 #[wasm_bindgen]
@@ -157,7 +157,7 @@ impl Viewer {
     /// Takes the next bytes of the file, however they were cut.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<JsProgress, WebError> {
         self.file.session_mut().feed(bytes)?;
-        self.arrive()?;
+        self.arrive();
         Ok(self.progress())
     }
 
@@ -165,7 +165,7 @@ impl Viewer {
     pub fn supply(&mut self) -> Result<bool, WebError> {
         let Some(mut next) = self.next.take() else {
             let any = self.file.supply()?;
-            self.arrive()?;
+            self.arrive();
             return Ok(any);
         };
         let supplied = next.supply();
@@ -176,7 +176,7 @@ impl Viewer {
             return supplied;
         }
         self.show_file(next)?;
-        self.arrive()?;
+        self.arrive();
         supplied
     }
 
@@ -536,15 +536,13 @@ impl Viewer {
         self.file.request_again()
     }
 
-    /// Bytes have come: when the base mesh is there, look at it.
-    fn arrive(&mut self) -> Result<(), WebError> {
-        if self.scene.bounds().is_none() && self.file.session().info().is_some() {
+    /// Bytes have come: when the base mesh is there, look at it. Nothing is drawn yet: the worker takes from the scene what does not
+    /// fit the volume.
+    fn arrive(&mut self) {
+        if self.scene.meet(self.file.session_mut()) {
             self.is_stale = true;
-            let updated = self.scene.update(self.file.session_mut());
             self.home();
-            updated?;
         }
-        Ok(())
     }
 }
 

@@ -18,4 +18,5 @@ mod support;
 mod theory;
 mod verify_real;
 mod verify_samples;
+mod verify_shown;
 mod verify_tampered;

@@ -233,8 +233,13 @@ fn errors_say_file_place_reason_and_remedy() {
     assert!(text("type=\"UnstructuredGrid\"", "type=\"PolyData\"").contains("PolyData"));
     assert!(text("LittleEndian", "MiddleEndian").contains("byte_order=\"MiddleEndian\" is not known"));
     assert!(text("</Cells>", "</Sells>").contains("not well-formed XML"));
-    let unknown = io::read_bytes("a.stl", b"solid").unwrap_err();
+    let unknown = io::read_bytes("a.txt", b"words").unwrap_err();
     assert_eq!(unknown.reason, ReadReason::UnknownFormat);
+    let surface = io::read_bytes("a.stl", b"solid").unwrap_err().to_string();
+    assert!(
+        surface.contains("a surface mesh (STL) cannot be read here; fill it with tetrahedra"),
+        "{surface}"
+    );
     let empty = io::read_bytes("a.vtu", b"").unwrap_err();
     assert_eq!(empty.reason, ReadReason::UnknownFormat);
 }

@@ -202,3 +202,65 @@ fn files_of_meshers() {
     pairs
         .for_each(|(text, binary)| assert!((text - binary).abs() <= 1e-14 * binary.abs(), "{text} {binary}"));
 }
+
+/// A field that is expected: its name, and its least and greatest value.
+type Range<'a> = (&'a str, f64, f64);
+
+#[cfg(feature = "formats")]
+#[test]
+fn odd_files_of_meshers_and_images() {
+    let Some(folder) = real_data() else { return };
+    let volume = |mesh: &TetMesh| -> f64 {
+        let of = |tet: &[u32; 4]| {
+            let [a, b, c, d] = tet.map(|v| glam::DVec3::from_array(mesh.positions[v as usize]));
+            (b - a).cross(c - a).dot(d - a).abs() / 6.0
+        };
+        mesh.tets.iter().map(of).sum()
+    };
+    let files: [(&str, f64, &[Range<'_>]); 8] = [
+        ("field/ascii.mha", 60.0, &[("value", 0.0, 12.0)]),
+        ("field/list.mhd", 60.0, &[("value", 0.0, 12.0)]),
+        ("field/axismins.nrrd", 180.0, &[]),
+        ("field/small_time.nrrd", 64.0, &[("value_0", 1.8343326288278838, 97.25087786234636)]),
+        (
+            "field/met.mesh",
+            8.0,
+            &[
+                ("sol_xx", 1.0, 3.0),
+                ("sol_yy", 2.0, 2.0),
+                ("sol_zz", 3.0, 3.0),
+                ("sol_xy", 10.0, 10.0),
+                ("sol_xz", 20.0, 20.0),
+                ("sol_yz", 30.0, 30.0),
+                ("sol_2_x", 5.0, 5.0),
+            ],
+        ),
+        ("field/p2_mixed.mesh", 8.0, &[("sol", 0.0, 2.0)]),
+        ("field/gm_elnode.msh", 8.0, &[("stress", 0.0, 2.0)]),
+        ("field/tg.ele", 8.0, &[]),
+    ];
+    for (name, whole, fields) in files {
+        let mesh = read(&folder, name);
+        assert!((volume(&mesh) - whole).abs() < 1e-9 && mesh.notes.is_empty(), "{name} {}", volume(&mesh));
+        for (field, least, greatest) in fields {
+            let field = mesh.fields.iter().find(|known| known.name == *field).expect(field);
+            let ends = field.values.iter().fold([f64::MAX, f64::MIN], |[a, b], v| [a.min(*v), b.max(*v)]);
+            assert_eq!(ends, [*least, *greatest], "{name} {}", field.name);
+        }
+    }
+    let grid = read(&folder, "field/axismins.nrrd").grid.unwrap();
+    assert_eq!((grid.origin, grid.spacing), ([10.0, 20.0, 30.0], [0.5, 2.0, 3.0]));
+    assert!(refused(&folder, "field/rgb2d.nrrd").to_string().contains("two-dimensional"));
+    let orphan = mesh::repair(read(&folder, "field/gm_orphan.msh")).unwrap().0;
+    assert_eq!((orphan.positions.len(), orphan.fields[0].name.as_str()), (27, "T"));
+    let steps = io::steps(&folder.join("field/gm_time.msh")).unwrap();
+    let times: Vec<_> = steps.iter().map(|step| (step.number, step.time)).collect();
+    assert_eq!(times, [(0, Some(0.0)), (1, Some(0.5)), (2, Some(1.0))]);
+    for step in steps {
+        let options = io::ReadOptions { step: step.number, ..io::ReadOptions::default() };
+        let mesh = io::read_with(&step.path, &options).unwrap();
+        let expected = (1, "T", step.time, 100.0 * step.number as f64);
+        let field = &mesh.fields[0];
+        assert_eq!((mesh.fields.len(), field.name.as_str(), field.time, field.values[0]), expected);
+    }
+}

@@ -171,9 +171,10 @@ test("vtk: polydata that are updated in place", async () => {
   await draws("vtk", { folder: "vtk/dist" });
 });
 
-test("react: the element", async () => {
+test("react: the element, and a canvas that StrictMode uses twice", async () => {
   await build("react");
   await draws("react", { folder: "react/dist", what: "tetralod-viewer" });
+  await draws("react-canvas", { folder: "react/dist", what: "canvas" });
 });
 
 test("notebook: a cell that imports from another origin and runs again", async () => {

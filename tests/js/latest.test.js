@@ -56,21 +56,24 @@ test("it is idle when nothing runs and nothing waits", async () => {
   assert.ok(idle);
 });
 
-test("movements that wait add up; of everything else the later one counts", () => {
-  const a = { orbit: [1, 2], zoom: [2, 0, 0], scene: { volume: {} }, size: [4, 5, 1] };
-  const b = { orbit: [10, 20], pan: [5, 6], zoom: [0.25, 0.1, 0.2], scene: { slices: [] } };
+test("movements that wait add up, changes of the scene stay apart; of everything else the later one counts", () => {
+  const sets = [{ id: 0, changes: { volume: {} } }, { id: 1, changes: { slices: [] } }];
+  const a = { orbit: [1, 2], zoom: [2, 0, 0], sets: sets.slice(0, 1), size: [4, 5, 1] };
+  const b = { orbit: [10, 20], pan: [5, 6], zoom: [0.25, 0.1, 0.2], sets: sets.slice(1) };
   assert.deepEqual(mergeUpdates(a, b), {
     ...{ orbit: [11, 22], pan: [5, 6], zoom: [0.5, 0.1, 0.2] },
-    ...{ scene: { slices: [] }, size: [4, 5, 1] },
+    ...{ sets, size: [4, 5, 1] },
   });
   assert.deepEqual(mergeUpdates({ pan: [1, 1] }, { pan: [2, 3], size: [4, 5, 1] }), { pan: [3, 4], size: [4, 5, 1] });
 });
 
 test("going home forgets the movements before it and keeps those after it", () => {
-  const home = mergeUpdates({ orbit: [1, 1], zoom: [3, 0, 0], scene: {} }, { home: true });
-  assert.deepEqual(home, { scene: {}, home: true });
-  assert.deepEqual(mergeUpdates(home, { orbit: [2, 0] }), { scene: {}, home: true, orbit: [2, 0] });
+  const sets = [{ id: 0, changes: {} }];
+  const home = mergeUpdates({ orbit: [1, 1], zoom: [3, 0, 0], sets }, { home: true });
+  assert.deepEqual(home, { sets, home: true });
+  assert.deepEqual(mergeUpdates(home, { orbit: [2, 0] }), { sets, home: true, orbit: [2, 0] });
   const camera = { target: [0, 0, 0], distance: 1, yaw: 0, pitch: 0, projection: "perspective" };
-  assert.deepEqual(mergeUpdates({ look: [1, 0], fly: [0, 0, 1] }, { camera }), { camera });
-  assert.deepEqual(mergeUpdates({ camera }, { home: true }), { home: true });
+  const set = { id: 1, changes: {}, camera };
+  assert.deepEqual(mergeUpdates({ look: [1, 0], fly: [0, 0, 1] }, { sets: [set] }), { sets: [set] });
+  assert.deepEqual(mergeUpdates({ sets: [set] }, { home: true }), { sets: [{ id: 1, changes: {} }], home: true });
 });

@@ -4,6 +4,7 @@ import { execFileSync } from "node:child_process";
 import { readFile } from "node:fs/promises";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
+import { withSizes, wrongSizes } from "../../xtask/js/stated.mjs";
 
 const pkg = fileURLToPath(new URL("../../pkg/", import.meta.url));
 
@@ -21,6 +22,7 @@ const FILES = [
   "element.js",
   "errors.js",
   "files.js",
+  "fit.js",
   "index.d.ts",
   "index.js",
   "inline.d.ts",
@@ -88,4 +90,15 @@ test("the licences of what is compiled into it are told", async () => {
   for (const name of ["wasm-bindgen", "constriction", "glam", "wgpu"]) assert.match(licences, new RegExp(`^(.*, )?${name} \\d`, "m"));
   // Folders of the machine that it was built on.
   assert.doesNotMatch(licences, /\/(home|root|work|Users)\//);
+});
+
+test("sizes that pages state are compared with the build, and written by it", () => {
+  const sizes = { "./viewer.wasm": { brotli: 406_400, raw: 1_200_000 }, "./three": { brotli: 1200, raw: 3000 } };
+  const page = (viewer, raw) => `wasm <!--kB ./viewer.wasm-->${viewer}<!----> kB, <!--kB ./three-->1<!----> kB; <!--raw kB ./viewer.wasm-->${raw}<!----> kB`;
+  assert.deepEqual(wrongSizes(page(406, 1200), sizes), []);
+  assert.deepEqual(wrongSizes(page(400, 1210), sizes), [], "a little off");
+  assert.deepEqual(wrongSizes(page(443, 1200), sizes), ["./viewer.wasm has 406400 bytes, not 443 kB"]);
+  assert.equal(withSizes(page(443, 7), sizes), page(406, 1200));
+  assert.match(wrongSizes("<!--kB ./core.wasm-->147<!----> kB", sizes)[0], /no entry/);
+  assert.match(wrongSizes("in 195 kB", sizes)[0], /"195 kB" has no mark/);
 });

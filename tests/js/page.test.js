@@ -320,6 +320,9 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   await page.selectOption("#surface-kind", "boundary");
   const glb = await save("[data-export=glb]");
   assert.deepEqual([glb.name, glb.bytes.toString("latin1", 0, 4)], ["bucky-explicit-boundary.glb", "glTF"]);
+  const { accessors, meshes } = JSON.parse(glb.bytes.toString("utf8", 20, 20 + glb.bytes.readUInt32LE(12)));
+  const { COLOR_0: colours, POSITION: places } = meshes[0].primitives[0].attributes;
+  assert.equal(accessors[colours].count, accessors[places].count, "each vertex has a colour");
   const rows = (await save("[data-export=csv]")).bytes.toString().trim().split("\n");
   assert.equal(rows[0], "what,x,y,z,distance,density");
   assert.match(rows[1], /^probe A,/);
@@ -399,6 +402,13 @@ test("an empty picture says why, and what does nothing is disabled", async () =>
   await press(page, "n");
   await press(page, "x");
   assert.ok(await page.locator("[data-export=csv]").isDisabled(), "there is no probe");
+
+  // The ends of the range are on the colour bar.
+  const ticks = await page.locator("#legend-ticks span:visible").allInnerTexts();
+  const { min, max } = (await demo(page, "info")).fields[0];
+  const numbers = ticks.map((words) => Number(words.replaceAll("−", "-")));
+  const off = Math.max(Math.abs(Math.min(...numbers) - min), Math.abs(Math.max(...numbers) - max));
+  assert.ok(off < 0.002 * (max - min), `${ticks}: ${min} to ${max}`);
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
@@ -612,6 +622,173 @@ test("volumes without pictures get some: drawn ones, then those that the page ha
   const taken = await pictures();
   assert.equal(taken.filter(([start]) => start.startsWith("data:image/web")).length, 1, "of the volume that was shown");
   await screenshot(page, "page-taken-pictures");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+const FLOW = "data/abc-flow.mt";
+
+/** Opens a volume in the place of the one that is there, as the page does with what is typed. */
+async function openAnother(page, url, kind) {
+  await page.click("#open-gallery");
+  await page.fill("#url", url);
+  await page.keyboard.press("Enter");
+  await page.waitForFunction((kind) => window.tetralodDemo.info?.kind === kind, kind, { timeout: PATIENCE });
+  await reach(page, "complete");
+}
+
+/** Waits for a note, which hides again after a while. */
+const noted = (page, { source }) =>
+  page.waitForFunction((source) => new RegExp(source).test(document.getElementById("note").textContent), source, { timeout: PATIENCE });
+
+test("another volume gets what fits it of the settings before, is told what does not, and undo goes back to all of it", async () => {
+  const page = await open(FLOW, undefined, VIEWPORT);
+  await reach(page, "complete");
+  const view = () => page.locator("[name=mode]:checked").getAttribute("value");
+  await press(page, "6");
+  await addressed(page, /view=flow/);
+  await settle(page);
+  await page.locator("#canvas").focus();
+  await openAnother(page, SMALL, "explicit");
+  await noted(page, /does not have it: .*view Flow/);
+  assert.equal(await view(), "iso");
+  assert.ok(await page.locator("#message").isHidden(), await page.locator("#message").innerText());
+  assert.equal(await demo(page, "error"), null);
+  assertDrawn(await picture(page, "another-volume"));
+  assert.deepEqual(await page.evaluate(() => [window.tetralodDemo.viewer.info.kind, "streamlines" in window.tetralodDemo.viewer.state]), ["explicit", false]);
+  await addressed(page, /^(?!.*flow)/);
+
+  await page.click("#undo");
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "half-edge", undefined, { timeout: PATIENCE });
+  await reach(page, "complete");
+  assert.equal(await view(), "flow");
+  await page.click("#redo");
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "explicit", undefined, { timeout: PATIENCE });
+  await reach(page, "complete");
+  assert.equal(await view(), "iso");
+  assert.equal(await demo(page, "error"), null);
+
+  // A link that names what is not there is shown as far as it has a meaning.
+  await page.evaluate((url) => (location.hash = `#url=${url}&view=flow&surface-colour=T&field=T&isovalue=99&range=500,600&time=5&probes=9,9,9&seeds=9,9,9`), FLOW);
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "half-edge", undefined, { timeout: PATIENCE });
+  await reach(page, "complete");
+  for (const words of [/field T/, /colours of T/, /isovalue 99 \(pressure is /, /colours of 500 to 600/, /1 probes outside/, /1 seeds outside/]) await noted(page, words);
+  assert.equal(await view(), "flow");
+  assert.equal(await demo(page, "error"), null);
+  assertDrawn(await picture(page, "link-of-another-volume"));
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a surface coloured by a field, with probes, gives way to another volume", async () => {
+  const page = await open(FLOW, undefined, VIEWPORT);
+  await reach(page, "complete");
+  await press(page, "1");
+  await page.selectOption("#surface-colour", { index: 2 });
+  await settle(page);
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("p");
+  await page.locator(".card").waitFor({ timeout: PATIENCE });
+  // By keyboard, what is found is told.
+  await page.waitForFunction(() => /^Probe A: pressure [−\d.]+.*; velocity/.test(document.getElementById("status").textContent), undefined, { timeout: PATIENCE });
+  await openAnother(page, SMALL, "explicit");
+  await noted(page, /does not have it: .*colours of velocity/);
+  assert.equal(await page.locator(".card").count(), 0);
+  assert.ok(await page.locator("#message").isHidden());
+  assert.equal(await page.inputValue("#surface-colour"), "");
+  assertDrawn(await picture(page, "another-surface"));
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the colour bar is there again when the same file is opened again", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  await press(page, "3");
+  await page.locator("#legend").waitFor({ timeout: PATIENCE });
+  const words = await page.innerText("#legend");
+  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+  await openAnother(page, SMALL, "explicit");
+  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+  await page.locator("#legend").waitFor({ timeout: PATIENCE });
+  assert.equal(await page.innerText("#legend"), words);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("colours and values mean the same at all times", async () => {
+  const page = await open(FLOW, undefined, VIEWPORT);
+  await reach(page, "complete");
+  const [low, high, speed] = await page.evaluate(() => {
+    const { fields } = window.tetralodDemo.info;
+    const most = (name) => Math.max(...fields.filter((field) => field.name === name).flatMap(({ min, max }) => [Math.abs(min), Math.abs(max)]));
+    const pressure = fields.filter(({ name }) => name === "pressure");
+    const components = [...new Set(fields.filter(({ vector }) => vector).map(({ name }) => name))];
+    return [Math.min(...pressure.map(({ min }) => min)), Math.max(...pressure.map(({ max }) => max)), Math.hypot(...components.map(most))];
+  });
+  const range = () => page.evaluate(() => window.tetralodDemo.viewer.legend?.range);
+  const near = (found, wanted) => found.every((value, i) => Math.abs(value - wanted[i]) <= 1e-4 * (wanted[1] - wanted[0]));
+  for (const [key, wanted] of [["3", [low, high]], ["6", [0, speed]]]) {
+    await press(page, key);
+    for (const time of [0, 5]) {
+      await setSlider(page, "time", time);
+      await settle(page);
+      const found = await range();
+      assert.ok(near(found, wanted), `key ${key}, time ${time}: ${found}, not ${wanted}`);
+    }
+  }
+  await press(page, "1");
+  const words = await page.innerText("#isovalue-text");
+  await setSlider(page, "time", 2);
+  assert.equal(await page.innerText("#isovalue-text"), words);
+  assert.equal(await page.inputValue("#isovalue"), "500");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a link to a file of the user asks for it, and shows it as in the link", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  const { origin, pathname } = new URL(page.url());
+  await page.goto("about:blank");
+  await page.goto(`${origin}${pathname}#url=file:mine.mt&view=slice&map=grey`);
+  await page.locator("#message").waitFor({ timeout: PATIENCE });
+  assert.match(await page.innerText("#message"), /mine\.mt.*Drop it on the page/s);
+  assert.ok(await page.locator("#choose-file").isVisible());
+  assert.equal(await demo(page, "info"), null, "nothing else is opened");
+  await screenshot(page, "page-link-to-file");
+  await page.evaluate(async (url) => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([await (await fetch(url)).arrayBuffer()], "mine.mt"));
+    window.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
+  }, SMALL);
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "explicit", undefined, { timeout: PATIENCE });
+  await reach(page, "complete");
+  assert.ok(await page.locator("#message").isHidden());
+  assert.deepEqual([await page.locator("[name=mode]:checked").getAttribute("value"), await page.inputValue("#map")], ["slice", "grey"]);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("on a phone the card of a probe stays in the picture", async () => {
+  const page = await open(FLOW, undefined, { viewport: { width: 360, height: 640 }, hasTouch: true, isMobile: true });
+  await reach(page, "complete");
+  await page.locator("label", { hasText: "Solid" }).first().tap();
+  await settle(page);
+  const stage = await page.locator("#canvas").boundingBox();
+  let cards = 0;
+  for (const [x, y] of [[0.5, 0.5], [0.35, 0.45], [0.62, 0.55]]) {
+    await page.touchscreen.tap(stage.x + x * stage.width, stage.y + y * stage.height);
+    await page.waitForTimeout(700);
+    for (const card of await page.locator(".card").all()) {
+      const box = await card.boundingBox();
+      cards++;
+      assert.ok(box.x >= stage.x && box.x + box.width <= stage.x + stage.width, JSON.stringify({ box, stage }));
+      assert.ok(box.y >= stage.y && box.y + box.height <= stage.y + stage.height, JSON.stringify({ box, stage }));
+    }
+  }
+  assert.ok(cards > 1, "there are probes");
+  await screenshot(page, "page-phone-probe");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

@@ -222,6 +222,62 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => /** @type {[s
       mt.free();
     });
 
+    test("a request that is given up leaves the mesh, fetches nothing more, and the next one is met", async () => {
+      const mt = await open();
+      await mt.refine(REQUESTS[0]);
+      const before = await mt.hash();
+      let closed = 0;
+      const held = [];
+      answer = (range, response) => {
+        held.push(range);
+        response.on("close", () => closed++);
+      };
+      const control = new AbortController();
+      const given = mt.refine({ error: 0 }, { signal: control.signal });
+      given.catch(() => {});
+      await until(() => held.length > 0, "something is asked for");
+      control.abort();
+      await assert.rejects(given, { name: "AbortError" });
+      await until(() => closed > 0, "a request is cancelled");
+      const { stats: now } = await mt.refine(REQUESTS[0], { partial: true });
+      assert.ok(now.satisfied && now.tetrahedra > 0);
+      assert.equal(await mt.hash(), before, "what was there can be made again without a server");
+      answer = good;
+      const early = { signal: AbortSignal.abort(new Error("enough")) };
+      for (const call of [(how) => mt.surface(how), (how) => mt.isosurface(0.2, how), (how) => mt.refine(REQUESTS[2], how)]) {
+        await assert.rejects(call(early), /enough/);
+        await call({});
+      }
+      assert.equal(await mt.hash(), hashes[2]);
+      held.length = 0;
+      answer = (range) => held.push(range);
+      const aside = mt.isosurface(0.2, { request: { error: 0 }, signal: AbortSignal.timeout(300) });
+      await assert.rejects(aside, { name: "TimeoutError" });
+      answer = good;
+      assert.ok((await mt.isosurface(0.2, { request: REQUESTS[1] })).indices.length > 0);
+      assert.equal(await mt.hash(), hashes[2]);
+      mt.free();
+    });
+
+    test("a request that is refused replaces none and changes nothing", async () => {
+      const mt = await open();
+      await mt.refine(REQUESTS[0]);
+      const wrong = [{ field: "T" }, { field: 7 }, { error: -1 }, { error: "1%", isovalues: [NaN] }, { box: [1, 1, 1, 0, 0, 0] }];
+      for (const request of wrong) await rejects(mt.refine(request), "bad-option");
+      await rejects(mt.setField("T"), "bad-option", /T/);
+      assert.equal(await mt.hash(), hashes[0]);
+      answer = (range, response) => setTimeout(() => good(range, response), 10);
+      let steps = 0;
+      let refused;
+      for await (const step of mt.refineSteps(REQUESTS[1], { budgetMs: 50 })) {
+        if (steps++ === 0) await rejects((refused = mt.refine({ field: "T" })), "bad-option");
+        assert.ok(step.tets.length > 0);
+      }
+      assert.ok(refused && steps > 1, `${steps} steps`);
+      assert.equal(await mt.hash(), hashes[1], "the steps go on to their end");
+      mt.free();
+    });
+
     test("a small memory holds what fits, and other requests find room again", async () => {
       const mt = await open({ memory: 300_000 });
       for (const round of [0, 1]) {

@@ -8,6 +8,7 @@ import { assertDrawn, distance, study } from "./study.js";
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test e2e`");
 const file = await readFile(`${folder}/blocks-half-edge.mt`);
+const fields = await readFile(`${folder}/fields.mt`);
 
 const PAGE = `<!doctype html><style>canvas { width: 300px; height: 200px }</style><canvas></canvas>
   <script type="importmap">{ "imports": { "tetralod": "/pkg/index.js", "tetralod/viewer": "/pkg/viewer.js" } }</script>`;
@@ -21,6 +22,8 @@ before(async () => {
   server = await servePackage(({ url }, response) => {
     asked.push(url);
     if (url === "/model.mt") response.end(file);
+    else if (url === "/fields.mt") response.end(fields);
+    else if (url === "/nothing.mt") response.writeHead(404).end();
     else response.setHeader("content-type", "text/html").end(PAGE);
   });
   browser = await launch();
@@ -81,6 +84,178 @@ test("what a viewer gives of its mesh is what MultiTessellation gives, with one 
     return Promise.all([viewer.probe([1, 2]), viewer.stats({ bin: 1 }), viewer.slice([0, 0, 0], 1)].map(code));
   });
   assert.deepEqual(codes, ["bad-option", "bad-option", "bad-option"]);
+  await page.close();
+});
+
+/** What a call is rejected with: its code, or its name. */
+const CODES = "window.codeOf = (promise) => promise.then(() => 'none', (error) => error.code ?? error.name)";
+
+test("what is wrong is refused and changes nothing, what comes with it is not, and another volume gets what fits it", async () => {
+  const page = await opened();
+  await page.evaluate(CODES);
+  const seen = await page.evaluate(async () => {
+    const { codeOf, tetralodDemo: { viewer, events } } = /** @type {any} */ (window);
+    const [x] = viewer.info.fields.map(({ name }) => name);
+    await viewer.set({ isosurfaces: [{ field: x }], boundary: { opacity: 0.5 } });
+    const before = JSON.stringify(viewer.state);
+    const wrong = [
+      { isosurfaces: [{ field: "T" }] },
+      { slices: [{ normal: [0, 0, 1], offset: 0.5, field: "T" }] },
+      { streamlines: { fields: ["u", "v", "w"], seeds: [[0, 0, 0]] } },
+      { arrows: { fields: [x, x, x], field: "T" } },
+      { arrows: { fields: [x, x, x], spacing: -1 } },
+      { cells: { colourBy: "T" } },
+      { colours: { range: [2, 1] } },
+      { colours: { range: [0, 1], log: true } },
+      { camera: { target: [0, 0, 0], distance: 1, yaw: 0, pitch: 0, projection: "round" }, outline: false },
+    ];
+    // At once: they go to the worker together, with one that is right between them.
+    const codes = Promise.all(wrong.map((state) => codeOf(viewer.set(state))));
+    const good = await codeOf(viewer.set({ outline: false }));
+    const refused = await codes;
+    const after = viewer.state;
+    const isSame = JSON.stringify({ ...after, outline: undefined }) === JSON.stringify({ ...JSON.parse(before), outline: undefined });
+    const meshes = [await codeOf(viewer.refine({ field: "T" })), await codeOf(viewer.refine({ error: "5%" }))];
+    return { refused, good, isSame, outline: after.outline, meshes, errors: events.filter(({ name }) => name === "error").length };
+  });
+  assert.deepEqual(seen, { refused: Array(9).fill("bad-option"), good: "none", isSame: true, outline: false, meshes: ["bad-option", "none"], errors: 0 });
+
+  const other = await page.evaluate(async () => {
+    const { codeOf, tetralodDemo: { viewer, events } } = /** @type {any} */ (window);
+    const [x] = viewer.info.fields.map(({ name }) => name);
+    await viewer.set({ isosurfaces: [], boundary: null, colours: { range: [0.1, 0.2] }, streamlines: { fields: [x, x, x], seeds: [[0.5, 0.5, 0.5]], field: x } });
+    await viewer.refine({ error: "5%" });
+    const { dropped, info } = await viewer.open("/fields.mt");
+    const { state } = viewer;
+    const again = await codeOf(viewer.set(state));
+    const mesh = await codeOf(viewer.refine({ error: "5%" }));
+    const own = await viewer.open("/fields.mt", { state: { isosurfaces: null, slices: [{ normal: [0, 0, 1], offset: 1e9 }], boundary: {} } });
+    const failed = await codeOf(viewer.open("/nothing.mt"));
+    return {
+      names: info.fields.map(({ name }) => name), parts: dropped.map(({ part }) => part), problem: dropped[0]?.problem,
+      isosurfaces: state.isosurfaces, streamlines: state.streamlines, again, mesh,
+      own: own.dropped.map(({ part }) => part), boundary: viewer.state.boundary, slices: viewer.state.slices, failed,
+      still: await codeOf(viewer.refine({ error: "5%" })),
+      errors: events.filter(({ name }) => name === "error").length,
+    };
+  });
+  assert.ok(other.parts.includes("streamlines"), JSON.stringify(other));
+  assert.match(other.problem, /there is no field ".*"; this volume has: /);
+  assert.deepEqual([other.isosurfaces, other.streamlines, other.again, other.mesh], [[{}], undefined, "none", "none"]);
+  assert.deepEqual([other.own, other.boundary, other.slices], [["slices[0]"], {}, []]);
+  assert.notEqual(other.failed, "none");
+  assert.deepEqual([other.still, other.errors], ["none", 0]);
+  await page.close();
+});
+
+test("after `open` alone the mesh becomes the one that the picture needs", async () => {
+  const page = await opened();
+  const seen = await page.evaluate(async () => {
+    const { viewer, events } = window.tetralodDemo;
+    const after = async (options) => {
+      events.length = 0;
+      const { finished } = await viewer.open("/model.mt", options);
+      await finished;
+      await new Promise((resolve) => setTimeout(resolve, 300));
+      return (await viewer.mesh()).tets.length / 4;
+    };
+    const [parts, whole] = [await after({}), await after({ whole: true })];
+    const { tetrahedra } = await viewer.refine({ view: { pixels: 1, outside: "10%" }, maxTets: 500_000 });
+    return { parts, whole, tetrahedra };
+  });
+  assert.ok(seen.tetrahedra > 1000, JSON.stringify(seen));
+  assert.deepEqual([seen.parts, seen.whole], [seen.tetrahedra, seen.tetrahedra]);
+  await page.close();
+});
+
+test("the legend comes again with a volume that is opened again", async () => {
+  const page = await opened();
+  const legends = await page.evaluate(async () => {
+    const { viewer } = window.tetralodDemo;
+    const next = () => new Promise((resolve) => viewer.addEventListener("legend", ({ detail }) => resolve(detail?.label), { once: true }));
+    const first = next();
+    await viewer.set({ boundary: {} });
+    const [label] = [await first];
+    const second = next();
+    await viewer.open("/model.mt");
+    return [label, await Promise.race([second, new Promise((resolve) => setTimeout(resolve, 5000, "none"))])];
+  });
+  assert.ok(legends[0]);
+  assert.equal(legends[1], legends[0]);
+  await page.close();
+});
+
+test("a request that is given up leaves the one before it", async () => {
+  const page = await opened();
+  await page.evaluate(CODES);
+  const seen = await page.evaluate(async () => {
+    const { codeOf, tetralodDemo: { viewer } } = /** @type {any} */ (window);
+    const { tetrahedra } = await viewer.refine({ error: "20%" });
+    await viewer.freeze();
+    const control = new AbortController();
+    const given = codeOf(viewer.refine({ error: 0 }, { signal: control.signal }));
+    const other = codeOf(viewer.refine({ error: 0 }, { signal: AbortSignal.timeout(60_000) }));
+    await viewer.reading([0, 0, 0]);
+    control.abort();
+    const first = await given;
+    await viewer.freeze(false);
+    const second = await other;
+    const whole = (await viewer.mesh()).tets.length / 4;
+    await viewer.refine({ error: "20%" });
+    await viewer.freeze();
+    const alone = new AbortController();
+    const gone = codeOf(viewer.refine({ error: 0 }, { signal: alone.signal }));
+    await viewer.reading([0, 0, 0]);
+    alone.abort();
+    const third = await gone;
+    await viewer.freeze(false);
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    return { first, second, third, whole, tetrahedra, now: (await viewer.mesh()).tets.length / 4, early: await codeOf(viewer.surface({ signal: AbortSignal.abort() })) };
+  });
+  const { first, second, third, whole, tetrahedra, now, early } = seen;
+  assert.deepEqual([first, second, third, early].map((code) => (code === 20 ? "AbortError" : code)), ["AbortError", "none", "AbortError", "AbortError"]);
+  assert.ok(whole > 2 * tetrahedra, "who waits for the same mesh gets it");
+  assert.equal(now, tetrahedra);
+  await page.close();
+});
+
+test("a canvas is used again by another viewer, as StrictMode does, and stays under the pointer", async () => {
+  const page = await browser.newPage();
+  await page.goto(server.address);
+  const codes = await page.evaluate(async () => {
+    const { Viewer } = await import("tetralod/viewer");
+    const canvas = document.querySelector("canvas");
+    const aborted = new AbortController();
+    // An effect, its end, and the effect again, before anything has happened.
+    const first = Viewer.create(canvas, { signal: aborted.signal });
+    aborted.abort();
+    const code = (promise) => promise.then(() => "none", (error) => (error instanceof DOMException ? error.name : error.code));
+    const seen = [await code(first)];
+    const mine = await Viewer.create(canvas);
+    seen.push(await code(Viewer.create(canvas)));
+    await mine.open("/model.mt");
+    mine.free();
+    for (let i = 0; i < 2; i++) {
+      const next = await Viewer.create(canvas);
+      await next.open("/model.mt", { state: { boundary: {}, isosurfaces: null } });
+      await next.refine({ error: 0 });
+      if (i === 0) next.free();
+      else window.tetralodDemo = { viewer: next };
+    }
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    const isUnder = document.elementFromPoint(left + width / 2, top + height / 2) === canvas;
+    return [...seen, isUnder, document.querySelectorAll("canvas").length];
+  });
+  assert.deepEqual(codes, ["AbortError", "bad-option", true, 2]);
+  let seen;
+  for (let i = 0; i < 60; i++) {
+    seen = await study(page, await page.locator("canvas").first().screenshot());
+    if (seen.covered > 0.03) break;
+    await page.waitForTimeout(250);
+  }
+  assertDrawn(seen, "the canvas again");
+  await page.evaluate(() => window.tetralodDemo.viewer.free());
+  assert.equal(await page.locator("canvas").count(), 1);
   await page.close();
 });
 

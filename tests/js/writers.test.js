@@ -1,7 +1,7 @@
 // The files that the demo page saves, read back.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { csv, glb, ply, stl, vtk, vtu } from "../../www/writers.js";
+import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "../../www/writers.js";
 
 const plainly = { origin: [0, 0, 0], offset: 0, scale: 1 };
 const mesh = {
@@ -93,6 +93,21 @@ test("glTF: the chunks hold what the accessors name", async () => {
   assert.deepEqual(json.accessors[attributes.POSITION].max, [1, 1, 1]);
 });
 
+test("glTF: colours of vertices are linear light, on the scale of the legend", async () => {
+  const legend = { range: /** @type {[number, number]} */ ([1, 100]), log: true, colours: ["#000000", "#ff8000", "#ffffff"] };
+  const values = Float32Array.of(-4, 0, 4.5, 49.5, 200);
+  // Values are 1 + 2 v: -7, 1, 10, 100, 401.
+  const colours = coloursOf({ values, origin: [0, 0, 0], offset: 1, scale: 2 }, legend);
+  const near = (found, wanted) => assert.ok(wanted.every((x, i) => Math.abs(found[i] - x) < 1e-5), `${found}: ${wanted}`);
+  near(colours, [0, 0, 0, 0, 0, 0, 1, 0.215861, 0, 1, 1, 1, 1, 1, 1]);
+  // Half of the way in sRGB is a fifth of the light.
+  near(coloursOf({ values: Float32Array.of(0.5), origin: [0, 0, 0], offset: 0, scale: 1 }, { ...legend, range: [0, 1], log: false, colours: ["#000000", "#ffffff"] }), [0.214041, 0.214041, 0.214041]);
+  const bytes = await bytesOf(glb({ ...surface, colours: colours.subarray(0, 12) }));
+  const { meshes, accessors } = JSON.parse(bytes.toString("utf8", 20, 20 + bytes.readUInt32LE(12)));
+  const { type, componentType, count } = accessors[meshes[0].primitives[0].attributes.COLOR_0];
+  assert.deepEqual([type, componentType, count], ["VEC3", 5126, 4]);
+});
+
 test("CSV: words with commas are in quotes, missing numbers are empty", async () => {
   assert.equal((await bytesOf(csv([["a,b", 'c"d'], [1.5, undefined]]))).toString(), '"a,b","c""d"\n1.5,\n');
 });
@@ -122,7 +137,7 @@ test("what is relative to an origin is saved in absolute numbers of double preci
   const polygons = await bytesOf(ply(farSurface));
   const end = "end_header\n";
   const body = polygons.indexOf(end) + end.length;
-  assert.match(polygons.toString("latin1"), /property double x\n[^]*property float nx\n[^]*property double the_density\n/);
+  assert.match(polygons.toString("latin1"), /property double x\n[\s\S]*property float nx\n[\s\S]*property double the_density\n/);
   assert.deepEqual(doubles(polygons, body + 44, 3, "LE"), places.slice(3, 6));
   assert.deepEqual(doubles(polygons, body + 36, 1, "LE"), [stored.offset + 1]);
 

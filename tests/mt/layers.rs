@@ -19,7 +19,7 @@ const LAYERS: [(&str, &[&str]); 20] = [
     ("format", &["geom", "mesh", "mt", "threads"]),
     ("refine", &["geom", "mesh", "mt"]),
     ("measure", &["geom", "mesh", "mt"]),
-    ("verify", &["geom", "mesh", "mt", "refine"]),
+    ("verify", &["geom", "mesh", "mt", "refine", "session", "view"]),
     ("view", &["geom", "mesh"]),
     ("stream", &[]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),

@@ -29,6 +29,8 @@ mod samples;
 mod scene_pick;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod scenes;
+#[cfg(feature = "vulkan")]
+mod shade;
 #[cfg(feature = "gpu")]
 mod shaders;
 #[cfg(feature = "vulkan")]

@@ -186,6 +186,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;
     shell::run(&mut node_test("pack.test.js"))?;
     shell::run(&mut node_test("latest.test.js"))?;
+    shell::run(&mut node_test("fit.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     shell::run(&mut node_test("writers.test.js"))?;
     shell::run(&mut node_test("bins.test.js"))?;
@@ -258,7 +259,10 @@ fn consumer() -> Result<()> {
     )?;
     let install = ["install", "--no-save", "--offline", "--loglevel=error"];
     shell::run(shell::npm(install).arg(&archive).current_dir(&project))?;
-    shell::run(node_tool("typescript/bin/tsc", &["--project"]).arg(&project))?;
+    for settings in ["tsconfig.json", "tsconfig.es2020.json", "tsconfig.jsx.json", "tsconfig.jsx-global.json"]
+    {
+        shell::run(node_tool("typescript/bin/tsc", &["--project"]).arg(project.join(settings)))?;
+    }
     with_fixture(|| shell::run(fixture_env(shell::command("node", ["dist/main.js"]).current_dir(&project))))
 }
 

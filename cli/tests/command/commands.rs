@@ -572,6 +572,37 @@ fn a_broken_promise_is_told_by_the_exit_code() {
 }
 
 #[test]
+fn bytes_are_counted_once_and_reports_are_quiet() {
+    let folder = Folder::new("counted");
+    let [input, mt, mesh] = ["b.vti", "b.mt", "b.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "9", "-o", &input]);
+    for options in [&["--lossless"][..], &["--kind", "edge", "--lossless"], &[]] {
+        let build = [&["build", &input, "-o", &mt, "--json", "--quiet"], options].concat();
+        let file_bytes = json(&build)["file_bytes"].as_u64().expect("a size");
+        for error in ["0", "1%", "20%"] {
+            let report = json(&["extract", &mt, "--error", error, "-o", &mesh, "--json"]);
+            let read = report["bytes_read"].as_u64().expect("a count");
+            assert!(0 < read && read <= file_bytes, "{options:?} {error}: {read} of {file_bytes}");
+        }
+    }
+}
+
+#[test]
+fn what_a_reader_leaves_out_is_said() {
+    let folder = Folder::new("notes");
+    let [input, mt] = ["a.nrrd", "a.mt"].map(|name| folder.path(name));
+    let header =
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nold min: -1\nold max: 3\n\n";
+    fs::write(&input, [header.as_bytes(), b"ABCDEFGH"].concat()).expect("a file");
+    let output = run(&["build", &input, "-o", &mt, "--quiet"]);
+    let said = text(&output.stderr);
+    assert!(
+        output.status.success() && said.contains("note: ") && said.contains("quantized from -1 to 3"),
+        "{said}"
+    );
+}
+
+#[test]
 fn inputs_are_never_replaced() {
     let folder = Folder::new("replaced");
     let [input, mt, table] = ["in.vti", "m.mt", "points.csv"].map(|name| folder.path(name));
@@ -587,6 +618,13 @@ fn inputs_are_never_replaced() {
     let before = read();
     let renamed = folder.path("m.vtu");
     fs::copy(&mt, &renamed).expect("a copy");
+    // What is read with an input is one, too.
+    let [list, medit, solution] = ["list.pvd", "a.mesh", "a.sol"].map(|name| folder.path(name));
+    fs::write(&list, "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"mesh.vtu\"/></Collection></VTKFile>")
+        .expect("a file");
+    [&medit, &solution]
+        .into_iter()
+        .for_each(|path| fs::write(path, "MeshVersionFormatted 2\n").expect("a file"));
     for arguments in [
         &["convert", &mt, "-o", &mt, "--kind", "explicit"][..],
         &["convert", &mt, "-o", &roundabout, "--kind", "explicit"],
@@ -596,6 +634,8 @@ fn inputs_are_never_replaced() {
         &["extract", &mt, "-o", &mesh, "--measure", &mesh],
         &["extract", &mt, "-o", &mesh, "--fit", &mesh],
         &["extract", &renamed, "-o", &renamed],
+        &["extract", &mt, "-o", &mesh, "--measure", &list],
+        &["build", &medit, "-o", &solution],
         &["probe", &mt, "--points", &table, "-o", &table],
         &["stats", &mt, "--reference", &table, "-o", &table],
     ] {

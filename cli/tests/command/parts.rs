@@ -37,7 +37,9 @@ fn parts_make_the_file_that_one_process_makes() {
     for node in ["1/1", "1/0", "2/0"] {
         good(&["join", &dir, "--node", node]);
     }
-    let joined = json(&["join", &dir, "-o", &mt, "--json"]);
+    // All that is in the folder is read, and stays.
+    bad(1, &["join", &dir, "-o", &format!("{dir}/built-2-0.part")], &["is an input, too", "another file"]);
+    let joined = json(&["join", &dir, "-o", &mt, "--json", "--quiet"]);
     let built = json(&["build", &input, "--parts", "16", "--meta", "who=me", "-o", &once, "--json"]);
     for count in ["vertices", "tetrahedra", "base_vertices", "updates", "depth", "file_bytes"] {
         assert_eq!(joined[count], built[count], "{count}");

@@ -1,5 +1,5 @@
-// What is not opaque, in exact order along the ray of each pixel, over what is: the volume, surfaces with
-// opacity, and shade where light hardly comes. Twin of the volume: `view/volume.rs`.
+// What is not opaque, in exact order along the ray of each pixel, over what is: the volume, and surfaces with
+// opacity. Twin of the volume: `view/volume.rs`.
 //
 // The ray enters tetrahedra at the faces of the boundary that are listed for the pixel, nearest first, and
 // goes on from neighbour to neighbour. A tetrahedron takes five numbers: its four neighbours, in ascending
@@ -27,8 +27,6 @@ struct Settings {
     // the clip planes that apply to the volume, a bit each (w unused).
     corners: vec4u,
     start: vec4u,
-    // Of the shade: strength, radius in model units (z, w unused).
-    shade: vec4f,
 }
 
 const NONE = 0xffffffffu;
@@ -313,75 +311,6 @@ fn middle_depth(pixel: vec2i) -> f32 {
     return select(1.0, sum / max(count, 1.0), 2.0 * count >= f32(samples));
 }
 
-// The place of the first sample, and whether there is something opaque. Along the unnormalised direction of a pixel's ray depth
-// grows alike for all pixels, since what the direction changes by over the screen is across the view: that takes no root for
-// each of the many places that the shade looks at.
-fn place_of(pixel: vec2i) -> vec4f {
-    let depth = textureLoad(depths, pixel, 0);
-    let at = (vec2f(pixel) + 0.5) / frame.viewport.xy * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
-    let origin = frame.origin.xyz + at.x * frame.origin_x.xyz + at.y * frame.origin_y.xyz;
-    let direction = frame.direction.xyz + at.x * frame.direction_x.xyz + at.y * frame.direction_y.xyz;
-    let forward = (frame.depth.x - frame.depth.y * depth) / (frame.depth.z * depth - frame.depth.w);
-    return vec4f(origin + forward / frame.direction.w * direction, f32(depth < 1.0));
-}
-
-// The difference to a neighbour on one of both sides: to the nearer one, so that it does not reach over an
-// edge.
-fn slope_of(middle: vec3f, before: vec4f, after: vec4f) -> vec3f {
-    let back = middle - before.xyz;
-    let ahead = after.xyz - middle;
-    let is_back = after.w == 0.0 || (before.w > 0.0 && dot(back, back) < dot(ahead, ahead));
-    return select(ahead, back, is_back);
-}
-
-const TAPS = 14;
-// Cosine and sine of five turns over that.
-const STEP = vec2f(-0.6234898, 0.7818315);
-
-// How much of the light of the sky does not come to an opaque place, 0 to 1, by what is near it on the screen
-// (McGuire and others, *The Alchemy screen-space ambient obscurance algorithm*, 2011).
-fn shade(pixel: vec2i) -> f32 {
-    let here = place_of(pixel);
-    if here.w == 0.0 || settings.shade.x <= 0.0 {
-        return 0.0;
-    }
-    let middle = here.xyz;
-    let x = slope_of(middle, place_of(pixel - vec2i(1, 0)), place_of(pixel + vec2i(1, 0)));
-    let y = slope_of(middle, place_of(pixel - vec2i(0, 1)), place_of(pixel + vec2i(0, 1)));
-    let view = towards_eye(middle);
-    var normal = cross(y, x);
-    if dot(normal, normal) == 0.0 {
-        return 0.0;
-    }
-    normal = normalize(normal) * select(-1.0, 1.0, dot(normal, view) > 0.0);
-    let radius = settings.shade.y;
-    // The radius on the screen, in pixels. Not by the matrix: Mesa's software driver would compile the shader again for
-    // each new one, which takes a second.
-    let ahead = frame.direction.xyz;
-    let depth = dot(middle - frame.origin.xyz, ahead) / dot(ahead, ahead);
-    let half_height = frame.origin_y.w + depth * frame.direction_y.w;
-    let reach = clamp(radius / half_height * 0.5 * frame.viewport.y, 2.0, 90.0);
-    // Each picture of a mean looks in other directions, so that the noise of one is not left in the mean.
-    let turn = 0.5 * frame.key_light.w * frame.viewport.x;
-    let noise = fract(52.9829189 * fract(dot(vec2f(pixel), vec2f(0.06711056, 0.00583715))) + turn);
-    // Five turns outwards, one step of the same angle after another.
-    let first = 6.2831853 * (2.5 / f32(TAPS) + noise);
-    var towards = vec2f(cos(first), sin(first));
-    var sum = 0.0;
-    for (var i = 0; i < TAPS; i += 1) {
-        let part = (f32(i) + 0.5) / f32(TAPS);
-        let other = place_of(pixel + vec2i(reach * part * towards));
-        towards = vec2f(dot(towards, vec2f(STEP.x, -STEP.y)), dot(towards, STEP.yx));
-        let way = other.xyz - middle;
-        let size = dot(way, way);
-        if other.w > 0.0 && size < radius * radius {
-            let fade = 1.0 - size / (radius * radius);
-            sum += fade * max(dot(way, normal) - 0.02 * radius, 0.0) / sqrt(size + 1e-4 * radius * radius);
-        }
-    }
-    return clamp(settings.shade.x * 2.0 * sum / f32(TAPS), 0.0, 0.85);
-}
-
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return over_screen(i, 0.0);
@@ -400,11 +329,5 @@ fn fs(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
         march_all(across_of(ray));
     }
     take_layers(FAR);
-    return vec4f(colour, 1.0 - transmittance * (1.0 - shade(vec2i(pixel.xy))));
-}
-
-// Only the shade.
-@fragment
-fn fs_shade(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
-    return vec4f(0.0, 0.0, 0.0, shade(vec2i(pixel.xy)));
+    return vec4f(colour, 1.0 - transmittance);
 }

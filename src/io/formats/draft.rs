@@ -1,5 +1,7 @@
 //! A mesh as the files of meshers list it, before its cells are split.
 
+use std::collections::BTreeMap;
+
 use crate::io::cells::{self, CellList, Numbering};
 use crate::io::error::ReadReason;
 use crate::io::fields::{Collector, check_finite, check_finite_cells};
@@ -13,6 +15,10 @@ pub(super) struct Draft<'a> {
     list: CellList,
     pub fields: Collector<'a>,
     pub cell_fields: Collector<'a>,
+    /// How many cells without a volume there are of each of VTK's types; they are left out.
+    flat: BTreeMap<i64, u64>,
+    /// What is left out, in words.
+    pub notes: Vec<String>,
     /// What is left out is noted here.
     pub input: MeshInput,
 }
@@ -20,19 +26,30 @@ pub(super) struct Draft<'a> {
 impl<'a> Draft<'a> {
     pub fn new(options: &'a ReadOptions) -> Self {
         let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options));
-        Self {
-            options,
-            coordinates: Vec::new(),
-            list: CellList::default(),
-            fields,
-            cell_fields,
-            input: MeshInput::default(),
-        }
+        let (coordinates, list, notes) = (Vec::new(), CellList::default(), Vec::new());
+        let input = MeshInput::default();
+        Self { options, coordinates, list, fields, cell_fields, flat: BTreeMap::new(), notes, input }
     }
 
     /// How many cells there are.
     pub fn cells(&self) -> usize {
         self.list.types.len()
+    }
+
+    /// Counts cells of VTK's type `kind`, which have no volume.
+    pub fn add_flat(&mut self, kind: i64, count: u64) {
+        *self.flat.entry(kind).or_default() += count;
+    }
+
+    /// Which of so many points a cell uses; all if there are no cells.
+    pub fn used(&self, points: usize) -> Vec<bool> {
+        let mut used = vec![self.list.connectivity.is_empty(); points];
+        for &point in &self.list.connectivity {
+            if let Some(used) = usize::try_from(point).ok().and_then(|point| used.get_mut(point)) {
+                *used = true;
+            }
+        }
+        used
     }
 
     /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has.
@@ -105,12 +122,22 @@ impl<'a> Draft<'a> {
             return Err(ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) });
         }
         let fields = expect_values(self.fields.fields, positions.len())?;
+        let has_flat = self.flat.iter().any(|(kind, count)| *count > 0 && !cells::are_points(&[*kind]));
+        if self.list.types.is_empty() && has_flat {
+            return Err(ReadReason::CellTypes(self.flat.into_iter().collect()));
+        }
         let others = [self.fields.others, std::mem::take(&mut self.cell_fields.others)];
         let [other_fields, other_cell_fields] = others;
         self.input.other_fields = other_fields;
         if self.list.types.is_empty() {
             check_finite(&positions, &fields, &|| None)?;
-            return Ok(TetMesh { positions, fields, input: self.input, ..TetMesh::default() });
+            return Ok(TetMesh {
+                positions,
+                fields,
+                input: self.input,
+                notes: self.notes,
+                ..TetMesh::default()
+            });
         }
         if !fields.is_empty() {
             self.cell_fields.drop_first();
@@ -125,7 +152,7 @@ impl<'a> Draft<'a> {
         split.spread(&mut cell_fields);
         let mut input = MeshInput { other_cell_fields, ..self.input };
         input.append(split.input);
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input })
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input, notes: self.notes })
     }
 }
 

@@ -1,20 +1,25 @@
 //! Gmsh's meshes (`.msh`): versions 1, 2, 4.0 and 4.1, ASCII and binary in either byte order; elements of the first and second
-//! order; views at nodes and elements. Elements without a volume are left out, as are partitions and periodicity.
+//! order; views at nodes, elements and nodes of elements, with their time steps. Elements without a volume are left out, as are
+//! partitions and periodicity. By <https://gmsh.info/doc/texinfo/gmsh.html#Gmsh-file-formats>.
 //!
 //! The numbers of geometric entities become the field `entity` at cells, those of physical groups `physical`.
 
 use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
-use crate::io::ReadOptions;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::formats::draft::Draft;
-use crate::io::formats::gmsh_sections::{read_elements, read_entities, read_nodes};
+use crate::io::formats::gmsh_sections::{read_elements, read_entities, read_nodes, read_partitions};
+use crate::io::formats::gmsh_views::{self, At as ViewAt, Head, SECTIONS, Steps, View};
 use crate::io::formats::scanner::Scanner;
 use crate::io::number::NumberType;
+use crate::io::{CellData, ReadOptions};
 use crate::mesh::TetMesh;
 
 /// How files begin.
-pub(super) const FIRST: [&str; 3] = ["$MeshFormat", "$NOD", "$Comments"];
+const FIRST: [&str; 3] = ["$MeshFormat", "$NOD", "$Comments"];
 
 /// Which of the layouts a file has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +44,10 @@ pub(super) struct Layout {
 pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let mut file = Scanner::new(bytes);
     let mut mesh = Mesh::new(options);
+    let of_elements = b"$ElementNodeData";
+    if bytes.windows(of_elements.len()).any(|window| window == of_elements) {
+        mesh.element_nodes = Some(HashMap::new());
+    }
     let mut section = String::new();
     let done = loop {
         match file.next_word() {
@@ -58,6 +67,26 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     mesh.finish()
 }
 
+/// The times of the steps in the file at `path`; none if it is of another format. That it cannot be read is for the reader to say.
+pub(super) fn times_at(path: &Path) -> Vec<f64> {
+    let mut head = Vec::new();
+    let Ok(mut file) = File::open(path) else { return Vec::new() };
+    let is_read = |result: std::io::Result<usize>| result.is_ok();
+    if !is_read(file.by_ref().take(64).read_to_end(&mut head)) || !is_first(&head) {
+        return Vec::new();
+    }
+    if !is_read(file.read_to_end(&mut head)) {
+        return Vec::new();
+    }
+    gmsh_views::times(&head)
+}
+
+/// Whether a file of this format begins with these bytes.
+pub(super) fn is_first(bytes: &[u8]) -> bool {
+    let start = bytes.trim_ascii_start();
+    FIRST.iter().any(|first| start.starts_with(first.as_bytes()))
+}
+
 /// What was read so far.
 pub(super) struct Mesh<'a> {
     layout: Option<Layout>,
@@ -70,17 +99,26 @@ pub(super) struct Mesh<'a> {
     pub physical: Vec<f64>,
     /// The physical group of each volume, by its tag, if it has one; none if no volume has one.
     pub groups: HashMap<i64, Option<i64>>,
+    /// The geometric entity that a partition of a volume is of, and its physical group.
+    pub partitions: HashMap<i64, (i64, Option<i64>)>,
+    /// The tags of the nodes of each element with a volume, if views at nodes of elements need them.
+    pub element_nodes: Option<HashMap<i64, Vec<i64>>>,
+    heads: Vec<Head>,
     views: Vec<View>,
+    /// Sections that are left out.
+    skipped: Vec<String>,
 }
 
-/// Values at nodes or elements.
-struct View {
-    name: String,
-    at_nodes: bool,
-    components: usize,
-    /// Of each node or element, by its tag.
-    rows: HashMap<i64, Vec<f64>>,
-}
+/// Sections that change neither places nor values.
+const HARMLESS: [&str; 7] = [
+    "$PhysicalNames",
+    "$Comments",
+    "$Periodic",
+    "$Parametrizations",
+    "$GhostElements",
+    "$PartitionedEntities",
+    "$InterpolationScheme",
+];
 
 impl<'a> Mesh<'a> {
     fn new(options: &'a ReadOptions) -> Self {
@@ -92,7 +130,11 @@ impl<'a> Mesh<'a> {
             entities: Vec::new(),
             physical: Vec::new(),
             groups: HashMap::new(),
+            partitions: HashMap::new(),
+            element_nodes: None,
+            heads: Vec::new(),
             views: Vec::new(),
+            skipped: Vec::new(),
         }
     }
 
@@ -113,62 +155,169 @@ impl<'a> Mesh<'a> {
             "$Entities" => read_entities(self, file, self.layout.ok_or_else(missing)?)?,
             "$Nodes" => read_nodes(self, file, self.layout.ok_or_else(missing)?)?,
             "$Elements" => read_elements(self, file, self.layout.ok_or_else(missing)?)?,
-            "$NodeData" | "$ElementData" => {
-                let view = read_view(file, self.layout.ok_or_else(missing)?, name == "$NodeData")?;
-                self.views.push(view);
+            "$PartitionedEntities"
+                if self.layout.is_some_and(|layout| layout.version == Version::FourOne) =>
+            {
+                read_partitions(self, file, self.layout.ok_or_else(missing)?)?;
             }
-            _ if name.starts_with('$') => return skip_section(file, name),
+            _ if name.starts_with('$') => {
+                let Some((_, at)) = SECTIONS.iter().find(|(known, _)| *known == name) else {
+                    return self.skip(file, name);
+                };
+                return self.view(file, self.layout.ok_or_else(missing)?, *at, name);
+            }
             other => {
                 let shown: String = other.chars().take(24).collect();
                 return Err(ReadReason::Syntax(format!("\"{shown}\" instead of a section")));
             }
         }
-        let end = file.word()?;
-        let expected = format!("$End{}", name.trim_start_matches('$'));
-        if end.eq_ignore_ascii_case(&expected) {
-            return Ok(());
+        expect_end(file, name)
+    }
+
+    /// Steps over a section, and notes that it is left out if its content is of use.
+    fn skip(&mut self, file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
+        let is_known = HARMLESS.contains(&name) || self.skipped.iter().any(|known| known == name);
+        if !is_known && self.skipped.len() < 16 {
+            self.skipped.push(name.chars().take(48).collect());
         }
-        let shown: String = end.chars().take(24).collect();
-        Err(ReadReason::Syntax(format!("\"{shown}\" instead of {expected}")))
+        skip_section(file, name)
+    }
+
+    /// Reads a view, if it is wanted.
+    fn view(
+        &mut self,
+        file: &mut Scanner<'_>,
+        layout: Layout,
+        at: ViewAt,
+        section: &str,
+    ) -> Result<(), ReadReason> {
+        let head = gmsh_views::read_head(file, at)?;
+        self.heads.push(head.clone());
+        let is_at_cells = at == ViewAt::Elements;
+        if is_at_cells && self.draft.options.cells != CellData::Values && !layout.binary {
+            let rows = HashMap::new();
+            self.views.push(View { head, rows });
+            return skip_section(file, section);
+        }
+        let view = gmsh_views::read_rows(file, layout, head)?;
+        self.views.push(view);
+        expect_end(file, section)
     }
 
     fn finish(mut self) -> Result<TetMesh, ReadError> {
         if self.nodes.is_empty() {
             return Err(ReadReason::Missing("section $Nodes".into())).at(String::new);
         }
-        for view in std::mem::take(&mut self.views) {
-            let place = || format!("view \"{}\"", view.name);
-            let values = self.values(&view).at(place)?;
-            let (name, components) = (&view.name, view.components);
-            if view.at_nodes {
-                self.draft.at_points(name, components, values, false).at(place)?;
-            } else {
-                self.draft.at_cells(name, components, values, false).at(place)?;
-            }
+        let steps = Steps::of(&self.heads);
+        let step = self.draft.options.step;
+        if step >= steps.times.len().max(1) {
+            let what = format!("time step {step} of {}", steps.times.len().max(1));
+            return Err(ReadReason::Missing(what)).at(String::new);
         }
-        for (name, values) in [("physical", self.physical), ("entity", self.entities)] {
+        let of_step = std::mem::take(&mut self.views).into_iter().filter(|view| steps.has(&view.head, step));
+        for view in gmsh_views::merge(of_step.collect()) {
+            let place = || format!("view \"{}\"", view.head.name);
+            self.add_view(&view).at(place)?;
+        }
+        for (name, values) in
+            [("physical", std::mem::take(&mut self.physical)), ("entity", std::mem::take(&mut self.entities))]
+        {
             if !values.is_empty() {
                 self.draft.at_cells(name, 1, values, true).at(String::new)?;
             }
         }
-        self.draft.finish().at(|| "$Elements".into())
+        let skipped = self.skipped.into_iter().map(|name| format!("section {name} is left out"));
+        self.draft.notes.extend(skipped);
+        let mut mesh = self.draft.finish().at(|| "$Elements".into())?;
+        let time = steps.times.get(step).copied();
+        mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+        Ok(mesh)
     }
 
-    /// The values of a view in the order of nodes or cells, all of which must have some.
-    fn values(&self, view: &View) -> Result<Vec<f64>, ReadReason> {
-        let mut tags = vec![0; self.nodes.len()];
-        self.nodes.iter().for_each(|(tag, index)| tags[*index] = *tag);
-        let tags = if view.at_nodes { &tags } else { &self.cell_tags };
-        let mut values = Vec::with_capacity(tags.len().saturating_mul(view.components).min(1 << 24));
-        for tag in tags {
-            let row = view.rows.get(tag).ok_or_else(|| {
-                let what = if view.at_nodes { "node" } else { "element" };
-                ReadReason::Missing(format!("the value of {what} {tag}"))
-            })?;
-            values.extend_from_slice(row);
+    /// Makes fields of a view.
+    fn add_view(&mut self, view: &View) -> Result<(), ReadReason> {
+        let Head { name, components, at, has_scheme, .. } = &view.head;
+        match at {
+            ViewAt::Nodes => {
+                let Some(claim) = self.draft.fields.claim(name, *components)? else { return Ok(()) };
+                let values = self.at_nodes(&view.rows, *components)?;
+                self.draft.fields.fill(claim, values, false, "");
+                Ok(())
+            }
+            ViewAt::Elements => {
+                let cells = &self.cell_tags;
+                let values =
+                    || rows_of(cells.iter().map(|tag| (*tag, true)), &view.rows, *components, "element");
+                self.draft.read_at_cells(name, *components, false, values)
+            }
+            ViewAt::ElementNodes if *has_scheme => {
+                self.draft
+                    .notes
+                    .push(format!("view \"{name}\" is left out: its values are of an interpolation scheme"));
+                Ok(())
+            }
+            ViewAt::ElementNodes => self.at_nodes_of_elements(view),
         }
-        Ok(values)
     }
+
+    /// Makes a field at nodes of values that each element has at its own.
+    fn at_nodes_of_elements(&mut self, view: &View) -> Result<(), ReadReason> {
+        let Head { name, components, .. } = &view.head;
+        let means = gmsh_views::means(view, self.element_nodes.as_ref().unwrap_or(&HashMap::new()));
+        let Ok(values) = self.at_nodes(&means.rows, *components) else {
+            self.draft
+                .notes
+                .push(format!("view \"{name}\" is left out: not all nodes of elements have values"));
+            return Ok(());
+        };
+        if means.differing > 0 {
+            let (count, largest) = (means.differing, means.largest);
+            self.draft.notes.push(format!(
+                "view \"{name}\": elements have different values at {count} nodes (by up to {largest}); their mean is taken"
+            ));
+        }
+        self.draft.at_points(name, *components, values, false)
+    }
+
+    /// The values at nodes in their order. Nodes that no element with a volume uses need none; theirs are 0.
+    fn at_nodes(&self, rows: &HashMap<i64, Vec<f64>>, components: usize) -> Result<Vec<f64>, ReadReason> {
+        let mut tags = vec![(0, false); self.nodes.len()];
+        self.nodes.iter().for_each(|(tag, index)| tags[*index].0 = *tag);
+        let is_used = self.draft.used(tags.len());
+        tags.iter_mut().zip(is_used).for_each(|(tag, is_used)| tag.1 = is_used);
+        rows_of(tags.into_iter(), rows, components, "node")
+    }
+}
+
+/// The rows of these nodes or elements, one behind the other; those that are needed must have one.
+fn rows_of(
+    tags: impl Iterator<Item = (i64, bool)>,
+    rows: &HashMap<i64, Vec<f64>>,
+    components: usize,
+    what: &str,
+) -> Result<Vec<f64>, ReadReason> {
+    let mut values = Vec::new();
+    for (tag, is_needed) in tags {
+        match rows.get(&tag) {
+            Some(row) if is_needed || row.iter().all(|value| value.is_finite()) => {
+                values.extend_from_slice(row)
+            }
+            None if is_needed => return Err(ReadReason::Missing(format!("the value of {what} {tag}"))),
+            _ => values.resize(values.len() + components, 0.0),
+        }
+    }
+    Ok(values)
+}
+
+/// Reads the word that ends a section.
+fn expect_end(file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
+    let end = file.word()?;
+    let expected = format!("$End{}", name.trim_start_matches('$'));
+    if end.eq_ignore_ascii_case(&expected) {
+        return Ok(());
+    }
+    let shown: String = end.chars().take(24).collect();
+    Err(ReadReason::Syntax(format!("\"{shown}\" instead of {expected}")))
 }
 
 fn read_format(file: &mut Scanner<'_>) -> Result<Layout, ReadReason> {
@@ -211,54 +360,6 @@ fn skip_section(file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
             return Ok(());
         }
     }
-}
-
-/// A view: its name, time and size, then a row for each node or element.
-fn read_view(file: &mut Scanner<'_>, layout: Layout, at_nodes: bool) -> Result<View, ReadReason> {
-    let mut name = String::new();
-    let strings: usize = file.number()?;
-    file.skip_line();
-    for i in 0..strings {
-        if file.rest().is_empty() {
-            return Err(ReadReason::Truncated { needed: strings as u64, found: i as u64 });
-        }
-        let line = String::from_utf8_lossy(file.line().trim_ascii()).trim_matches('"').to_owned();
-        if i == 0 {
-            name = line;
-        }
-    }
-    let reals: usize = file.number()?;
-    for _ in 0..reals {
-        file.number::<f64>()?;
-    }
-    let integers: usize = file.number()?;
-    let mut sizes = Vec::new();
-    for _ in 0..integers {
-        sizes.push(file.number::<usize>()?);
-    }
-    // The step, the components, the rows, and a partition.
-    let (Some(&components), Some(&count)) = (sizes.get(1), sizes.get(2)) else {
-        return Err(ReadReason::Missing("the size of a view".into()));
-    };
-    if components == 0 || components > 1 << 10 {
-        return Err(ReadReason::TooLarge { what: "components".into(), limit: 1 << 10 });
-    }
-    if layout.binary {
-        file.skip_line();
-    }
-    let mut rows = HashMap::new();
-    for _ in 0..count {
-        let row = if layout.binary {
-            let tag = file.integers(1, NumberType::I32, layout.big)?[0];
-            (tag, file.floats(components, NumberType::F64, layout.big)?)
-        } else {
-            let tag = file.number()?;
-            let values: Result<Vec<f64>, _> = (0..components).map(|_| file.number()).collect();
-            (tag, values?)
-        };
-        rows.insert(row.0, row.1);
-    }
-    Ok(View { name, at_nodes, components, rows })
 }
 
 #[cfg(test)]
@@ -418,6 +519,113 @@ mod tests {
         assert_eq!(groups(&in_group.replace("\n3 2 4 1\n", "\n3 3 4 1\n")), Some(vec![0.0]));
         let entities = "$Entities\n1 0 0 1\n9 0 0 0 1 1 1 0\n2 0 0 0 1 1 1 1 6 0\n$EndEntities\n$Nodes";
         assert_eq!(groups(&four.replacen("$Nodes", entities, 1)), Some(vec![6.0]));
+    }
+
+    /// A view's section with these rows.
+    fn view(section: &str, name: &str, [time, step, components]: [&str; 3], rows: &[&str]) -> String {
+        let count = rows.len();
+        let rows = rows.join("\n");
+        format!(
+            "${section}\n1\n\"{name}\"\n1\n{time}\n3\n{step}\n{components}\n{count}\n{rows}\n$End{section}\n"
+        )
+    }
+
+    const ROWS: [&str; 4] = ["7 1", "2 2", "9 3", "4 4"];
+
+    #[test]
+    fn steps_of_a_view_are_time_steps() {
+        let later = |by: &str| ROWS.map(|row| format!("{row}{by}"));
+        let rows = later("0");
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        let two = [
+            TWO,
+            &view("NodeData", "T", ["0.5", "1", "1"], &rows),
+            &view("NodeData", "T", ["0", "0", "1"], &ROWS),
+        ]
+        .concat();
+        assert_eq!(gmsh_views::times(two.as_bytes()), [0.0, 0.5]);
+        let read_step = |step: usize| read(two.as_bytes(), &ReadOptions { step, ..EVERYTHING });
+        for (step, first, time) in [(0, 1.0, 0.0), (1, 10.0, 0.5)] {
+            let mesh = read_step(step).unwrap();
+            let names: Vec<&str> = mesh.fields.iter().map(|field| field.name.as_str()).collect();
+            // The other view has one step, and holds at all.
+            assert_eq!(names, ["T (K)", "T"]);
+            assert_eq!((mesh.fields[1].values[0], mesh.fields[1].time), (first, Some(time)));
+        }
+        assert!(read_step(2).unwrap_err().to_string().contains("time step 2 of 2 is missing"));
+        // Steps of one time, as of modes: their numbers are the times.
+        let modes = two.replace("1\n0.5\n3", "1\n0\n3");
+        assert_eq!(gmsh_views::times(modes.as_bytes()), [0.0, 1.0]);
+        let one = read(TWO.as_bytes(), &EVERYTHING).unwrap();
+        assert_eq!((gmsh_views::times(TWO.as_bytes()).len(), one.fields[0].time), (0, None));
+    }
+
+    #[test]
+    fn partitions_of_a_view_come_together() {
+        let parts = [
+            TWO,
+            &view("NodeData", "T", ["0", "0", "1"], &ROWS[..2]),
+            &view("NodeData", "T", ["0", "0", "1"], &ROWS[2..]),
+        ]
+        .concat();
+        let mesh = read(parts.as_bytes(), &EVERYTHING).unwrap();
+        assert_eq!((mesh.fields.len(), &mesh.fields[1].values), (2, &vec![1.0, 2.0, 3.0, 4.0]));
+        // What has the same nodes is another view of that name.
+        let twice = [TWO, &view("NodeData", "T", ["0", "0", "1"], &ROWS).repeat(2)].concat();
+        let names: Vec<_> =
+            read(twice.as_bytes(), &EVERYTHING).unwrap().fields.into_iter().map(|f| f.name).collect();
+        assert_eq!(names, ["T (K)", "T", "T_2"]);
+    }
+
+    #[test]
+    fn values_at_nodes_of_elements() {
+        let at = |rows: &[&str]| {
+            let file = [TWO, &view("ElementNodeData", "s", ["0", "0", "1"], rows)].concat();
+            read(file.as_bytes(), &EVERYTHING).unwrap()
+        };
+        let equal = at(&["5 4 1 2 3 4", "1 3 9 9 9"]);
+        assert_eq!(
+            (equal.fields[1].name.as_str(), &equal.fields[1].values),
+            ("s", &vec![1.0, 2.0, 3.0, 4.0])
+        );
+        assert!(equal.notes.is_empty());
+        let two = TWO.replace("$Elements\n2\n", "$Elements\n3\n6 4 2 6 2 2 7 9 4\n");
+        let file =
+            [two.as_str(), &view("ElementNodeData", "s", ["0", "0", "1"], &["5 4 1 2 3 4", "6 4 2 1 3 8"])]
+                .concat();
+        let differing = read(file.as_bytes(), &ReadOptions::default()).unwrap();
+        assert_eq!(differing.fields[1].values, [1.0, 2.0, 3.0, 6.0]);
+        assert_eq!(
+            differing.notes,
+            ["view \"s\": elements have different values at 1 nodes (by up to 4); their mean is taken"]
+        );
+        assert!(at(&["1 3 9 9 9"]).notes[0].contains("view \"s\" is left out"));
+    }
+
+    #[test]
+    fn nodes_of_no_element_need_no_value() {
+        let more = TWO.replace("$Nodes\n4\n", "$Nodes\n5\n11 5 5 5\n");
+        let mesh = read(more.as_bytes(), &EVERYTHING).unwrap();
+        assert_eq!(mesh.fields[0].values, [0.0, 1.0, 2.0, 3.0, 4.0]);
+        let not_finite = more.replace("1\n4\n4 4\n", "1\n5\n11 nan\n4 4\n");
+        assert_eq!(read(not_finite.as_bytes(), &EVERYTHING).unwrap().fields[0].values[0], 0.0);
+    }
+
+    #[test]
+    fn sections_that_are_left_out_are_said() {
+        let more = format!("{TWO}$Periodic\n0\n$EndPeriodic\n$Mine\n1 2\n$EndMine\n");
+        assert_eq!(read(more.as_bytes(), &EVERYTHING).unwrap().notes, ["section $Mine is left out"]);
+    }
+
+    #[test]
+    fn partitions_of_volumes_have_their_groups() {
+        let [four_one, ..] = ascii();
+        let section = "$PartitionedEntities\n2\n0\n1 0 0 1\n1 0 9 1 1 0 0 0 1 7\n\
+            5 3 2 1 1 0 0 0 1 1 1 1 6 0\n$EndPartitionedEntities\n$Nodes";
+        let text = four_one.replacen("$Nodes", section, 1).replace("\n3 2 4 1\n", "\n3 5 4 1\n");
+        let mesh = read(text.as_bytes(), &EVERYTHING).unwrap();
+        let of = |name: &str| mesh.cell_fields.iter().find(|f| f.name == name).map(|f| f.values.clone());
+        assert_eq!((of("physical"), of("entity")), (Some(vec![6.0]), Some(vec![2.0])));
     }
 
     #[test]

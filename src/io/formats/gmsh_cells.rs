@@ -8,14 +8,16 @@ pub(super) struct Element {
     pub points: usize,
     /// VTK's type, and which of Gmsh's points is each of VTK's; none if it has no volume.
     pub cell: Option<(i64, &'static [usize])>,
+    /// VTK's type if it has no volume.
+    pub flat: i64,
 }
 
 const fn flat(points: usize) -> Element {
-    Element { points, cell: None }
+    Element { points, cell: None, flat: 0 }
 }
 
 const fn solid(kind: i64, order: &'static [usize]) -> Element {
-    Element { points: order.len(), cell: Some((kind, order)) }
+    Element { points: order.len(), cell: Some((kind, order)), flat: 0 }
 }
 
 /// A type of elements that has a volume, but is not split: the number of none of VTK's.
@@ -23,7 +25,7 @@ const HIGHER_ORDER: i64 = -1;
 
 /// The type of this number.
 pub(super) fn element(kind: i64) -> Option<Element> {
-    Some(match kind {
+    let element = match kind {
         1 => flat(2),
         2 => flat(3),
         3 => flat(4),
@@ -57,13 +59,32 @@ pub(super) fn element(kind: i64) -> Option<Element> {
         26 => flat(4),
         27 => flat(5),
         28 => flat(6),
-        29 => Element { points: 20, cell: Some((HIGHER_ORDER, &[])) },
-        30 => Element { points: 35, cell: Some((HIGHER_ORDER, &[])) },
-        31 => Element { points: 56, cell: Some((HIGHER_ORDER, &[])) },
+        29 => Element { points: 20, cell: Some((HIGHER_ORDER, &[])), flat: 0 },
+        30 => Element { points: 35, cell: Some((HIGHER_ORDER, &[])), flat: 0 },
+        31 => Element { points: 56, cell: Some((HIGHER_ORDER, &[])), flat: 0 },
         36 => flat(16),
         37 => flat(25),
         _ => return None,
-    })
+    };
+    Some(Element { flat: flat_kind(kind), ..element })
+}
+
+/// VTK's type for the elements of this number, which have no volume.
+fn flat_kind(kind: i64) -> i64 {
+    match kind {
+        1 => 3,
+        2 => 5,
+        3 => 9,
+        8 => 21,
+        9 => 22,
+        10 => 28,
+        15 => 1,
+        16 => 23,
+        // Lines, triangles and quadrilaterals of any order.
+        26..=28 => 68,
+        36 | 37 => 70,
+        _ => 69,
+    }
 }
 
 impl Element {

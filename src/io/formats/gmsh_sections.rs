@@ -108,6 +108,43 @@ pub(super) fn read_entities(
     Ok(())
 }
 
+/// Reads `$PartitionedEntities` of version 4.1 up to its end: of which volume each partition is, and its physical group.
+pub(super) fn read_partitions(
+    mesh: &mut Mesh<'_>,
+    file: &mut Scanner<'_>,
+    layout: Layout,
+) -> Result<(), ReadReason> {
+    let mut numbers = Numbers { file, layout };
+    numbers.end_line();
+    numbers.count()?;
+    for _ in 0..numbers.count()? {
+        // A ghost entity and its partition.
+        numbers.int()?;
+        numbers.int()?;
+    }
+    let mut counts = [0; 4];
+    for count in &mut counts {
+        *count = numbers.count()?;
+    }
+    for (dimension, count) in counts.into_iter().enumerate() {
+        for _ in 0..count {
+            let (tag, parent_dimension, parent) = (numbers.int()?, numbers.int()?, numbers.int()?);
+            numbers.first_tag()?;
+            for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                numbers.float()?;
+            }
+            let group = numbers.first_tag()?;
+            if dimension > 0 {
+                numbers.first_tag()?;
+            }
+            if dimension == 3 && parent_dimension == 3 {
+                mesh.partitions.insert(tag, (parent, group));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Reads `$Nodes` up to its end.
 pub(super) fn read_nodes(
     mesh: &mut Mesh<'_>,
@@ -262,8 +299,10 @@ fn read_element_blocks(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Re
     }
     for _ in 0..blocks {
         let (_, entity) = numbers.entity()?;
+        let (entity, of_partition) = mesh.partitions.get(&entity).copied().unwrap_or((entity, None));
         // What is in no group is in group 0, as version 2 has it.
         let group = mesh.groups.get(&entity).map(|group| group.unwrap_or(0));
+        let group = of_partition.or(group);
         let element = known(numbers.int()?)?;
         for _ in 0..numbers.count()? {
             let tag = numbers.tag()?;
@@ -293,7 +332,13 @@ fn add_element(
     for _ in 0..element.points {
         points.push(numbers.tag()?);
     }
-    let Some((kind, order)) = element.cell else { return Ok(()) };
+    let Some((kind, order)) = element.cell else {
+        mesh.draft.add_flat(element.flat, 1);
+        return Ok(());
+    };
+    if let Some(element_nodes) = &mut mesh.element_nodes {
+        element_nodes.insert(tag, points.clone());
+    }
     for point in &mut points {
         let index = mesh.nodes.get(point);
         *point = *index.ok_or_else(|| ReadReason::Missing(format!("node {point}")))? as i64;

@@ -16,7 +16,7 @@ use netcdf_reader::{NcFile, NcOpenOptions};
 
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::formats::{exodus, vtkhdf};
-use crate::io::{ReadOptions, in_file};
+use crate::io::{ReadOptions, foreign, in_file};
 use crate::mesh::TetMesh;
 
 /// The first bytes of HDF5 files.
@@ -110,6 +110,7 @@ fn content(storage: DynStorage) -> Result<Content, ReadError> {
         if root.0.iter().any(|name| name == vtkhdf::ROOT) {
             return Ok(Content::Vtkhdf(file));
         }
+        foreign::refuse_hdf5(&root.0).at(String::new)?;
     }
     let options = NcOpenOptions { max_read_bytes: limit, max_chunk_bytes: chunk, ..NcOpenOptions::default() };
     let file = NcFile::from_storage_with_options(storage, options);

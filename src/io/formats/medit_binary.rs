@@ -1,22 +1,25 @@
-//! Medit's meshes in binary (`.meshb`), with solutions at vertices in the `.solb` file of the same name, if there is one: versions
+//! Medit's meshes in binary (`.meshb`), with solutions in the `.solb` file of the same name, if there is one: versions
 //! 1 to 4, either byte order.
 
+use std::ops::RangeInclusive;
+
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::formats::draft::Draft;
-use crate::io::formats::medit::{CELLS, components_of};
+use crate::io::formats::medit::{Array, FLAT, Parts, SOLUTIONS, components_of, expect_three};
+use crate::io::formats::medit_cells::{KINDS, expect_known, ordering, refused};
 use crate::io::formats::scanner::Scanner;
 use crate::io::number::NumberType;
 use crate::io::{Beside, ReadOptions, in_file};
 use crate::mesh::TetMesh;
 
-/// Numbers of the sections that are read; others are stepped over.
+/// Numbers of sections that are read; those of cells and solutions are with their names.
 const DIMENSION: i64 = 3;
 const VERTICES: i64 = 4;
-const SOLUTION_AT_VERTICES: i64 = 62;
+const BEZIER: i64 = 125;
 const END: i64 = 54;
-/// Those of cells with a volume, and their names in text.
-const CELL_SECTIONS: [(i64, &str); 4] =
-    [(8, "Tetrahedra"), (9, "Prisms"), (10, "Hexahedra"), (49, "Pyramids")];
+/// Those of the order of points of quadratic cells.
+const ORDERINGS: RangeInclusive<i64> = 133..=139;
+/// Sections that change neither places nor values: what has no volume, what belongs to it, and geometry.
+const HARMLESS: [RangeInclusive<i64>; 7] = [1..=7, 11..=25, 27..=29, 31..=32, 34..=45, 47..=61, 126..=132];
 
 /// Whether a file begins with these bytes: a one in either byte order, then the version.
 pub(super) fn is_first(bytes: &[u8]) -> bool {
@@ -63,26 +66,14 @@ pub(super) fn read(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Result<TetMesh, ReadError> {
-    let mut draft = Draft::new(options);
-    let mut references = Vec::new();
-    each_section(bytes, &mut |section, number| {
-        if number == VERTICES {
-            section.vertices(&mut draft)?;
-        }
-        match CELL_SECTIONS.iter().find(|(of, _)| *of == number) {
-            Some((_, name)) => section.cells(name, &mut draft, &mut references),
-            None => Ok(()),
-        }
-    })?;
-    draft.at_cells("ref", 1, references, true).at(String::new)?;
+    let mut parts = Parts::new(options);
+    each_section(bytes, &mut |section, number| section.read(number, &mut parts))?;
     // A mesh need not have one.
     if let Ok(bytes) = beside(solution) {
-        let read = each_section(&bytes, &mut |section, number| {
-            if number == SOLUTION_AT_VERTICES { section.solution(&mut draft) } else { Ok(()) }
-        });
+        let read = each_section(&bytes, &mut |section, number| section.read(number, &mut parts));
         read.map_err(|error| in_file(error, solution))?;
     }
-    draft.finish().at(String::new)
+    parts.finish().at(String::new)
 }
 
 /// The data of a section.
@@ -110,11 +101,7 @@ fn each_section(
         let next = section.integer(layout.position).at(place)?;
         if number == DIMENSION {
             let dimension = section.integer(NumberType::I32).at(place)?;
-            if dimension != 3 {
-                let what = format!("a mesh in {dimension} dimensions");
-                let remedy = "give a mesh of volumes".into();
-                return Err(ReadReason::Unsupported { what, remedy }).at(place);
-            }
+            expect_three(dimension).at(place)?;
         }
         read(&mut section, number).at(place)?;
         if next == 0 {
@@ -138,50 +125,77 @@ impl Section<'_> {
         usize::try_from(count).map_err(|_| ReadReason::Syntax(format!("{count} is not a count")))
     }
 
-    fn vertices(&mut self, draft: &mut Draft<'_>) -> Result<(), ReadReason> {
+    /// Reads the section of this number.
+    fn read(&mut self, number: i64, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
+        if let Some(kind) = KINDS.iter().position(|kind| kind.number == number) {
+            return self.cells(kind, parts);
+        }
+        if let Some((_, _, of)) = SOLUTIONS.iter().find(|(_, known, _)| *known == number) {
+            let arrays = self.solution()?;
+            return parts.solution(*of, arrays);
+        }
+        if let Some((order, width)) = ordering(|(_, known)| known == number) {
+            let count = self.count()?.checked_mul(width).unwrap_or(usize::MAX);
+            let table = self.data.integers(count, NumberType::I32, self.layout.big)?;
+            parts.cells.orders.insert(order, table);
+            return Ok(());
+        }
+        if let Some((_, _, kind)) = FLAT.iter().find(|(_, known, _)| *known == number) {
+            let count = self.count()? as u64;
+            parts.draft.add_flat(*kind, count);
+            return Ok(());
+        }
+        match number {
+            VERTICES => self.vertices(parts),
+            BEZIER => {
+                parts.cells.is_bezier = self.integer(NumberType::I32)? != 0;
+                Ok(())
+            }
+            number if HARMLESS.iter().chain([&ORDERINGS]).any(|range| range.contains(&number)) => Ok(()),
+            number => match refused(number) {
+                Some(name) => expect_known(name),
+                None => parts.skip(&format!("number {number}")),
+            },
+        }
+    }
+
+    fn vertices(&mut self, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
         for _ in 0..self.count()? {
-            draft.coordinates.extend(self.data.floats(3, self.layout.float, self.layout.big)?);
+            let place = self.data.floats(3, self.layout.float, self.layout.big)?;
+            parts.draft.coordinates.extend(place);
             self.integer(self.layout.integer)?;
         }
         Ok(())
     }
 
-    fn cells(
-        &mut self,
-        name: &str,
-        draft: &mut Draft<'_>,
-        references: &mut Vec<f64>,
-    ) -> Result<(), ReadReason> {
-        let Some((_, kind, order)) = CELLS.iter().find(|(of, ..)| *of == name) else { return Ok(()) };
-        for _ in 0..self.count()? {
-            let numbers = self.data.integers(order.len() + 1, self.layout.integer, self.layout.big)?;
+    fn cells(&mut self, kind: usize, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
+        let (count, points) = (self.count()?, KINDS[kind].points);
+        for _ in 0..count {
+            let numbers = self.data.integers(points + 1, self.layout.integer, self.layout.big)?;
             // They are numbered from 1.
-            draft.add_cell(*kind, order.iter().map(|&p| numbers[p].saturating_sub(1)));
-            references.push(numbers[order.len()] as f64);
+            let of_cell: Vec<i64> = numbers[..points].iter().map(|point| point.saturating_sub(1)).collect();
+            parts.cells.add(&mut parts.draft, kind, &of_cell, numbers[points] as f64);
         }
+        parts.cells.counts.push((KINDS[kind].name, count));
         Ok(())
     }
 
-    fn solution(&mut self, draft: &mut Draft<'_>) -> Result<(), ReadReason> {
+    fn solution(&mut self) -> Result<Vec<Array>, ReadReason> {
         let count = self.count()?;
-        let kinds = self.integer(NumberType::I32)?;
-        let mut components = Vec::new();
-        for _ in 0..kinds {
-            components.push(components_of(self.integer(NumberType::I32)?)?);
+        let mut arrays = Vec::new();
+        for _ in 0..self.integer(NumberType::I32)? {
+            let components = components_of(self.integer(NumberType::I32)?)?;
+            arrays.push(Array { components, values: Vec::new() });
         }
-        if components.is_empty() {
+        if arrays.is_empty() {
             return Err(ReadReason::Syntax("a solution without values".into()));
         }
-        let mut arrays = vec![Vec::new(); components.len()];
         for _ in 0..count {
-            for (array, components) in arrays.iter_mut().zip(&components) {
-                array.extend(self.data.floats(*components, self.layout.float, self.layout.big)?);
+            for Array { components, values } in &mut arrays {
+                values.extend(self.data.floats(*components, self.layout.float, self.layout.big)?);
             }
         }
-        for (array, components) in arrays.into_iter().zip(components) {
-            draft.at_points("sol", components, array, false)?;
-        }
-        Ok(())
+        Ok(arrays)
     }
 }
 
@@ -245,8 +259,7 @@ mod tests {
     }
 
     fn solution(version: i32, big: bool) -> Vec<u8> {
-        let mut parts =
-            vec![Start(DIMENSION), Int(3), Start(SOLUTION_AT_VERTICES), Wide(4), Int(2), Int(1), Int(2)];
+        let mut parts = vec![Start(DIMENSION), Int(3), Start(62), Wide(4), Int(2), Int(1), Int(2)];
         for i in 0..4 {
             parts.extend([0, 1, 2, 3].map(|c| Float(f64::from(4 * i + c))));
         }
@@ -256,7 +269,10 @@ mod tests {
 
     fn read_both(mesh: &[u8], solution: &[u8]) -> Result<TetMesh, ReadError> {
         let options = ReadOptions { cells: CellData::Values, ..ReadOptions::default() };
-        let beside = |_: &str| Ok(solution.to_vec());
+        let beside = |_: &str| match solution {
+            [] => Err(ReadReason::Io("none".into())),
+            solution => Ok(solution.to_vec()),
+        };
         read(mesh, "a.solb", &options, &beside)
     }
 
@@ -273,6 +289,37 @@ mod tests {
                 assert_eq!(mesh.fields[3].values, [3.0, 7.0, 11.0, 15.0]);
             }
         }
+    }
+
+    #[test]
+    fn quadratic_cells_with_their_order() {
+        for version in 1..5 {
+            // The edges of the last vertex first.
+            let edges = [[0, 3], [1, 3], [2, 3], [0, 1], [1, 2], [2, 0]];
+            let corners = [[0., 0., 0.], [2., 0., 0.], [0., 2., 0.], [0., 0., 2.]];
+            let middle = |[a, b]: [usize; 2]| [0, 1, 2].map(|i| (corners[a][i] + corners[b][i]) / 2.0);
+            let mut parts = vec![Start(DIMENSION), Int(3), Start(VERTICES), Wide(10)];
+            for [x, y, z] in corners.into_iter().chain(edges.map(middle)) {
+                parts.extend([Float(x), Float(y), Float(z), Wide(0)]);
+            }
+            parts.extend([Start(30), Wide(1)]);
+            parts.extend((1..=10).chain([7]).map(Wide));
+            parts.extend([Start(133), Wide(10)]);
+            for place in (0..4).map(|c| [c, c]).chain(edges) {
+                parts.extend((0..4).map(|i| Int(place.iter().filter(|&&c| c == i).count() as i64)));
+            }
+            parts.extend([Start(108), Start(END)]);
+            let mesh = read_both(&written(version, true, &parts), b"").unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(mesh.tets.len(), 8);
+            let volume = |tet: &[u32; 4]| {
+                let [a, b, c, d] = tet.map(|v| glam::DVec3::from_array(mesh.positions[v as usize]));
+                (b - a).cross(c - a).dot(d - a) / 6.0
+            };
+            assert!(mesh.tets.iter().all(|tet| (volume(tet) - 1.0 / 6.0).abs() < 1e-12));
+            assert_eq!(mesh.notes, ["section number 108 is left out"]);
+        }
+        let cubic = written(2, false, &[Start(DIMENSION), Int(3), Start(96), Wide(0), Start(END)]);
+        assert!(read_both(&cubic, b"").unwrap_err().to_string().contains("TetrahedraP3"));
     }
 
     #[test]

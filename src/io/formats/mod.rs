@@ -10,10 +10,12 @@ mod exodus_cells;
 mod gmsh;
 mod gmsh_cells;
 mod gmsh_sections;
+mod gmsh_views;
 #[cfg(feature = "hdf5")]
 pub(super) mod hdf5;
 mod medit;
 mod medit_binary;
+mod medit_cells;
 mod metaimage;
 mod netgen;
 mod nrrd;
@@ -47,7 +49,7 @@ impl Format {
         if start.starts_with(nrrd::MAGIC) {
             return Some(Self::Nrrd);
         }
-        if gmsh::FIRST.iter().any(|first| start.starts_with(first.as_bytes())) {
+        if gmsh::is_first(start) {
             return Some(Self::Gmsh);
         }
         if medit_binary::is_first(bytes) {
@@ -103,6 +105,18 @@ pub(super) fn read(
         Format::Nrrd => nrrd::read(bytes, options, beside),
         Format::MetaImage => metaimage::read(bytes, options, beside),
     })
+}
+
+/// The times of the steps in the file at `path`; fewer than two if it is of no format that is known to have some.
+pub(super) fn times_at(path: &Path) -> Result<Vec<f64>, ReadError> {
+    #[cfg(feature = "hdf5")]
+    {
+        let times = hdf5::times_at(path)?;
+        if !times.is_empty() {
+            return Ok(times);
+        }
+    }
+    Ok(gmsh::times_at(path))
 }
 
 /// The name of the file beside the one called `name` that has another ending.

@@ -1,4 +1,5 @@
 //! Netgen's meshes (`.vol`): linear cells, and quadratic tetrahedra, pyramids and prisms. The number of the material becomes the field `material` at cells.
+//! Elements without a volume, names, and the curves of cells are left out.
 
 use crate::io::ReadOptions;
 use crate::io::error::{At, ReadError, ReadReason};
@@ -37,16 +38,40 @@ fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRe
     while let Some(word) = file.next_word()? {
         match word {
             "endmesh" => break,
+            "dimension" => {
+                let dimension: i64 = file.number()?;
+                if dimension != 3 {
+                    let what = format!("a mesh in {dimension} dimensions");
+                    return Err(ReadReason::Unsupported { what, remedy: "give a mesh of volumes".into() });
+                }
+            }
             "volumeelements" => {
                 for _ in 0..file.number::<usize>()? {
                     materials.push(file.number::<f64>()?);
                     add_cell(file, draft)?;
                 }
             }
+            "surfaceelements" | "surfaceelementsuv" | "surfaceelementsgi" => {
+                draft.add_flat(TRIANGLE, file.number()?);
+            }
             "points" => {
                 for _ in 0..file.number::<usize>()? {
                     draft.coordinates.extend(file.numbers::<f64, 3>()?);
                 }
+            }
+            // Names may be any words.
+            "materials" | "bcnames" | "cd2names" | "cd3names" => {
+                let count: usize = file.number()?;
+                file.skip_line();
+                for _ in 0..count {
+                    if file.rest().is_empty() {
+                        break;
+                    }
+                    file.skip_line();
+                }
+            }
+            "curvedelements" => {
+                draft.notes.push("section curvedelements is left out: cells are straight".into())
             }
             // Sections that are not needed are stepped over word by word.
             _ => {}
@@ -57,6 +82,9 @@ fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRe
     }
     draft.at_cells("material", 1, materials, true)
 }
+
+/// VTK's type of triangles: what surfaces are mostly of.
+const TRIANGLE: i64 = 5;
 
 fn add_cell(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadReason> {
     let count: usize = file.number()?;
@@ -95,6 +123,19 @@ mod tests {
             ("material", &vec![7.0])
         );
         (0..MESH.len()).for_each(|length| drop(read_text(&MESH[..length])));
+    }
+
+    #[test]
+    fn names_are_no_sections_and_what_is_left_out_is_said() {
+        let named = MESH.replace("1\n1 steel\n", "2\n1 points\n2 endmesh\ncurvedelements\n1 2 3\n");
+        let mesh =
+            read_text(&named.replace("points\n4\n0 0 0", "materials\n1\n1 volumeelements\npoints\n4\n0 0 0"));
+        let mesh = mesh.unwrap();
+        assert_eq!((mesh.positions.len(), mesh.tets.len(), mesh.notes.len()), (4, 1, 1));
+        let surface = read_text(&MESH.replace("\n1\n7 4 1 3 2 4", "\n0")).unwrap_err().to_string();
+        assert!(surface.contains("surface"), "{surface}");
+        let flat = read_text(&MESH.replace("dimension\n3", "dimension\n2")).unwrap_err().to_string();
+        assert!(flat.contains("2 dimensions"), "{flat}");
     }
 
     /// The edges of Netgen's quadratic cells in the order of the points at their middle, of which the first is behind the

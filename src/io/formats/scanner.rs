@@ -78,6 +78,18 @@ impl<'a> Scanner<'a> {
         word
     }
 
+    /// The words of the next line that has some, without its comment; none at the end of the file.
+    pub fn row(&mut self) -> Result<Option<Vec<&'a str>>, ReadReason> {
+        self.skip_space();
+        if self.rest().is_empty() {
+            return Ok(None);
+        }
+        let line = std::str::from_utf8(self.line());
+        let line = line.map_err(|_| ReadReason::Syntax("binary data where text is expected".into()))?;
+        let line = if self.comments { line.split('#').next().unwrap_or_default() } else { line };
+        Ok(Some(line.split_ascii_whitespace().collect()))
+    }
+
     /// The rest of the line, without its end.
     pub fn line(&mut self) -> &'a [u8] {
         let start = self.at;
@@ -92,10 +104,7 @@ impl<'a> Scanner<'a> {
 
     pub fn number<T: FromStr>(&mut self) -> Result<T, ReadReason> {
         let word = self.word()?;
-        word.parse().map_err(|_| {
-            let shown: String = word.chars().take(24).collect();
-            ReadReason::Syntax(format!("\"{shown}\" is not a number of the expected kind"))
-        })
+        parsed(word)
     }
 
     pub fn numbers<T: FromStr, const N: usize>(&mut self) -> Result<[T; N], ReadReason> {
@@ -129,6 +138,14 @@ impl<'a> Scanner<'a> {
     pub fn floats(&mut self, count: usize, kind: NumberType, big: bool) -> Result<Vec<f64>, ReadReason> {
         Ok(kind.floats(self.take(count.checked_mul(kind.size()))?, big))
     }
+}
+
+/// The number that a word stands for.
+pub(super) fn parsed<T: FromStr>(word: &str) -> Result<T, ReadReason> {
+    word.parse().map_err(|_| {
+        let shown: String = word.chars().take(24).collect();
+        ReadReason::Syntax(format!("\"{shown}\" is not a number of the expected kind"))
+    })
 }
 
 #[cfg(test)]

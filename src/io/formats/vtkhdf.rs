@@ -236,7 +236,7 @@ impl Reader<'_> {
         let split = split.at(|| place("Connectivity"))?.unwrap_or_default();
         split.spread(&mut cell_fields);
         let input = MeshInput { other_fields, other_cell_fields, ..split.input };
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input })
+        Ok(TetMesh { positions, fields, tets: split.tets, cell_fields, input, ..TetMesh::default() })
     }
 
     fn positions(&self, piece: &Piece) -> Result<Vec<[f64; 3]>, ReadReason> {

@@ -39,7 +39,8 @@ const hash: string = await mt.hash();
 // What three.js has, without three.js.
 const matrix = { elements: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, -0.5, -0.5, 1, 1] };
 const probe: Need = { error: "2%", sphere: { center: { x: 0.5, y: 0.5, z: 0.5 }, radius: 0.2 } };
-const copy: Mesh = await mt.refine({ error: "50%" });
+const copy: RefineResult = await mt.refine({ error: "50%" });
+const plain: Mesh = copy;
 let steps = 0;
 const seen: RefineOptions = { view: { matrix, viewport: [640, 480], pixels: 4, outside: "20%" }, needs: [probe] };
 for await (const step of mt.refineSteps(seen, { budgetMs: 2, deltas: true })) {
@@ -61,6 +62,14 @@ const where: Where = ({ errors }) => errors.map((error) => error / 0.1);
 const asked = await local.refine({ where }, { deltas: true });
 const told: Mesh = applyChanges(emptyMesh(), asked);
 local.free();
+
+// A call that is given up leaves a mesh that is valid.
+const ended = AbortSignal.abort(new Error("enough"));
+const why: string[] = await Promise.all(
+  [mt.refine({ error: 0 }, { signal: ended }), mt.isosurface(0.5, { signal: ended }), mt.surface({ signal: ended })].map((call) =>
+    call.then(() => "", (error: unknown) => String(error)),
+  ),
+);
 
 const failed: ErrorCode | undefined = await mt.refine({ error: -1 }).then(
   () => undefined,
@@ -86,6 +95,8 @@ const good =
   beside.indices.length > 0 &&
   asked.stats.satisfied &&
   told.tets.length === 4 * asked.tetCount &&
+  plain.tets === copy.tets &&
+  why.every((words) => words === "Error: enough") &&
   failed === "bad-option" &&
   (await refusal()) === "no-webgpu";
 console.log(`${info.vertices} vertices, ${mesh.stats.tetrahedra} tetrahedra extracted, hash ${hash}`);

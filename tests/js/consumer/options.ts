@@ -70,6 +70,7 @@ const results: Examples<ResultOptions> = {
   partial: { partial: true },
   arrays: { arrays: ["field"] },
   zeroCopy: { zeroCopy: true },
+  signal: { signal: new AbortController().signal },
 };
 
 const openings: Examples<OpenOptions> = {
@@ -120,6 +121,7 @@ const infos: Members<MtInfo> = {
   kind: "string",
   fields: "object",
   bounds: "object",
+  origin: "object",
   vertices: "number",
   tetrahedra: "number",
   updates: "number",
@@ -130,6 +132,8 @@ const fields: Members<FieldInfo> = {
   min: "number",
   max: "number",
   bits: "number",
+  offset: "number",
+  scale: "number",
   unit: "string",
   time: "number undefined",
   vector: "object undefined",

@@ -1,9 +1,10 @@
 // What a page does with the viewer: each option and event type-checks, and without a page there is a clear error.
-import type { LineProfile, MtInfo } from "tetralod";
+import type { LineProfile, Mesh, MtInfo } from "tetralod";
 import {
   TetralodError,
   Viewer,
   type BlockMap,
+  type Misfit,
   type OpenedVolume,
   type Overlay,
   type OwnView,
@@ -33,7 +34,14 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   viewer.addEventListener("stats", ({ detail }) => void (detail satisfies ViewerStats));
   viewer.addEventListener("frame", ({ detail }) => void (detail satisfies ViewerFrame));
   viewer.addEventListener("error", ({ detail }) => void detail.message);
-  const { info, finished }: OpenedVolume = await viewer.open("volume.mt", { fields: ["p"] });
+  const { signal } = new AbortController();
+  const first: ViewerState = { streamlines: { fields: ["u", "v", "w"], seeds: [] } };
+  const { info, dropped, finished }: OpenedVolume = await viewer.open("volume.mt", { fields: ["p"], signal, state: { ...first, boundary: null } });
+  dropped.map(({ part, problem }: Misfit) => `${part}: ${problem}`) satisfies string[];
+  await viewer.refine({ error: "1%" }, { signal });
+  await Promise.all([viewer.settled({ signal }), viewer.isosurface(0.5, { signal }), viewer.screenshot({ signal })]);
+  const whole: Mesh = await viewer.mesh();
+  whole.tets satisfies Uint32Array;
   const known: MtInfo | undefined = viewer.info ?? info;
   for (const request of requests) (await viewer.refine(request)) satisfies ViewerStats;
   const value: number = known.fields[0]?.min ?? 0;
