@@ -308,15 +308,15 @@ fn field_row(steps: &[Field]) -> String {
         None => String::new(),
     };
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    let [min, max] = [*min, *max].map(output::number);
+    let [min, max] = output::ends([*min, *max]);
     let worst = rounded(steps.iter().map(|step| step.quantization).fold(0.0, f64::max));
     let last = steps.last().and_then(|step| step.time);
     let time = match (*time, last) {
         (Some(first), Some(last)) if steps.len() > 1 => {
-            let [first, last] = [first, last].map(output::number);
+            let [first, last] = [first, last].map(output::exact);
             format!("; {} times from {first} to {last}", steps.len())
         }
-        (Some(time), _) => format!("; time {}", output::number(time)),
+        (Some(time), _) => format!("; time {}", output::exact(time)),
         _ => String::new(),
     };
     format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
@@ -352,7 +352,8 @@ fn part_row(part: &FilePart, file_bytes: u64) -> String {
 }
 
 fn rows(report: &Report) -> Vec<(&str, String)> {
-    let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
+    let axis = |i: usize| output::ends([report.bounds[i], report.bounds[i + 3]]);
+    let [[x0, x1], [y0, y1], [z0, z1]] = [axis(0), axis(1), axis(2)];
     let structure = report.structure.as_ref();
     let depth = structure.map_or(String::new(), |all| format!(", at most {} deep", output::count(all.depth)));
     let mut rows = vec![
