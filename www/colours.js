@@ -1,5 +1,7 @@
 /** The settings of colours: map, direction, scale and range. */
 
+import { precise } from "./format.js";
+
 /** The fractions of the volume between which the range of percentiles lies. */
 const PERCENTILES = [0.02, 0.98];
 /** A logarithmic range that begins below this part of its upper end is made to begin at that other part of it. */
@@ -121,7 +123,7 @@ export class ColourSettings {
     const { low: lower, high: upper } = this.#parts;
     for (const [input, value] of [[lower, low], [upper, high]]) {
       input.setCustomValidity("");
-      if (document.activeElement !== input) input.value = Math.abs(value) < 1e-9 * (high - low) ? 0 : Number(value.toPrecision(5));
+      if (document.activeElement !== input) input.value = Math.abs(value) < 1e-9 * (high - low) ? 0 : precise(value, high - low, 5);
     }
   }
 

@@ -4,7 +4,7 @@
 const $ = (id) => document.getElementById(id);
 
 /** Seeds have so many digits: as many as links keep. */
-const DIGITS = 8;
+const DIGITS = 12;
 
 /** @typedef {import("tetralod").FieldInfo} FieldInfo */
 /** @typedef {[number, number, number]} Point */

@@ -36,10 +36,27 @@ export function nameOf(from) {
   return from.name ?? String(from).split(/[?#]/)[0].split("/").pop();
 }
 
+/** Digits that numbers have at most. */
+const MOST_DIGITS = 17;
+
+/** How many digits of a number tell it from others of a range as so many do of a number of that size. */
+function digitsIn(value, range, digits) {
+  const farther = Math.abs(value) / Math.abs(range);
+  return Math.min(digits + (farther > 1 && farther < Infinity ? Math.ceil(Math.log10(farther)) : 0), MOST_DIGITS);
+}
+
+/** The length of the diagonal of a box `[x0, y0, z0, x1, y1, z1]`. */
+export const diagonalOf = (bounds) => Math.hypot(...[0, 1, 2].map((i) => bounds[i + 3] - bounds[i]));
+
+/** A number rounded to so many digits, and more if it is far from 0 for the range that it is from. */
+export const precise = (value, range, digits) => Number(value.toPrecision(digitsIn(value, range, digits)));
+
 /** A number with digits according to the range that it is from. */
 export function rounded(value, range) {
   const magnitude = Math.abs(value);
   if (magnitude < Math.abs(range) * 1e-6 || value === 0) return "0";
-  const words = magnitude >= 1e5 || magnitude < 1e-3 ? value.toExponential(2) : String(Number(value.toPrecision(4)));
+  const digits = digitsIn(value, range, 4);
+  const isLong = (magnitude >= 1e5 && digits < 6) || magnitude < 1e-3;
+  const words = isLong ? value.toExponential(Math.max(digits - 2, 2)) : String(Number(value.toPrecision(digits)));
   return words.replaceAll("-", "−");
 }

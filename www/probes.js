@@ -5,7 +5,7 @@
  * the points at its ends.
  */
 
-import { rounded } from "./format.js";
+import { diagonalOf, precise, rounded } from "./format.js";
 import { showIdle } from "./idle.js";
 import { element } from "./overlay.js";
 import { linePlot } from "./plot.js";
@@ -66,7 +66,8 @@ export class Probes {
 
   /** The positions of the points that are kept, as numbers. */
   get words() {
-    return this.#coming ?? String(this.#pins.flatMap(({ position }) => position.map((x) => Number(x.toPrecision(DIGITS)))));
+    const range = this.#pins.length > 0 ? diagonalOf(this.#viewer.info.bounds) : 1;
+    return this.#coming ?? String(this.#pins.flatMap(({ position }) => position.map((x) => precise(x, range, DIGITS))));
   }
 
   set words(words) {
@@ -198,8 +199,7 @@ export class Probes {
       add(field.name, `${rounded(values[field.name], field.max - field.min)} ${field.unit}`.trim());
     }
     if (fields.length > MOST_FIELDS) add("", `and ${fields.length - MOST_FIELDS} more fields`);
-    const bounds = this.#viewer.info.bounds;
-    const diagonal = Math.hypot(...[0, 1, 2].map((i) => bounds[i + 3] - bounds[i]));
+    const diagonal = diagonalOf(this.#viewer.info.bounds);
     add("position", position.map((x) => rounded(x, diagonal)).join(", "));
     add("cell size", rounded(size, size));
     add("cell error", `${Number((100 * error).toPrecision(2))} %`);

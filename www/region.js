@@ -1,5 +1,6 @@
 /** The region of the request: a box with handles, the sphere in it, or the side of the clip plane that is shown. */
 
+import { diagonalOf, precise } from "./format.js";
 import { $, all } from "./dom.js";
 import { showEmpty } from "./empty.js";
 import { fail } from "./messages.js";
@@ -76,7 +77,7 @@ export function inner(bounds) {
   return rounded(bounds.map((value, i) => value + (bounds[(i + 3) % 6] - value) / 4));
 }
 
-const rounded = (numbers) => Array.from(numbers, (x) => Number(x.toPrecision(DIGITS)));
+const rounded = (numbers, digits = DIGITS) => Array.from(numbers, (x) => precise(x, diagonalOf(page.viewer.info?.bounds ?? [0, 0, 0, 1, 1, 1]), digits));
 
 /** The box has handles that the viewer draws; the sphere in it is drawn over the picture. */
 function showSphere() {
@@ -85,7 +86,7 @@ function showSphere() {
 
 function showNumbers() {
   for (const input of all("#box input")) {
-    if (document.activeElement !== input) input.value = Number(page.box[input.dataset.i].toPrecision(5));
+    if (document.activeElement !== input) [input.value] = rounded([page.box[input.dataset.i]], 5).map(String);
   }
 }
 

@@ -2,7 +2,7 @@
 
 import { $, text } from "./dom.js";
 import { rangeOf } from "./fields.js";
-import { rounded } from "./format.js";
+import { precise, rounded } from "./format.js";
 import { expectFrame } from "./empty.js";
 import { showHistogramLine, showVolumes } from "./histogram.js";
 import { showIdle } from "./idle.js";
@@ -34,7 +34,7 @@ export function fractionOf(value) {
 /** Takes an isovalue at a fraction of the field's range. */
 export function setIsovalue(fraction) {
   const { min, max } = page.field;
-  page.isovalue = Number((min + fraction * (max - min)).toPrecision(DIGITS));
+  page.isovalue = precise(min + fraction * (max - min), max - min, DIGITS);
   applyIsovalue();
 }
 
@@ -193,7 +193,7 @@ export function applyCut() {
   if (!demo.info) return;
   const { axis, low, high } = span();
   const at = placeOfPlane();
-  const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
+  const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : precise(at, high - low, 3);
   const side = $("flip").checked ? "<" : ">";
   const shown = isSection() ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
   text("cut-text", shown, "cut");

@@ -6,7 +6,7 @@
 
 import { $, all, checked } from "./dom.js";
 import { chooseField, isPlaying, rangeOf } from "./fields.js";
-import { rounded } from "./format.js";
+import { precise, rounded } from "./format.js";
 import { fail } from "./messages.js";
 import { open, sourceWords } from "./opening.js";
 import { demo, page } from "./page.js";
@@ -115,7 +115,8 @@ let isSet = true;
 
 const wordsOf = (camera) => {
   const { target, distance, yaw, pitch, projection } = camera;
-  const all = [...target, distance, yaw, pitch].map((x) => Number(x.toPrecision(CAMERA_DIGITS)));
+  const place = target.map((x) => precise(x, distance, CAMERA_DIGITS));
+  const all = [...place, ...[distance, yaw, pitch].map((x) => Number(x.toPrecision(CAMERA_DIGITS)))];
   return `${all}${projection === "orthographic" ? ",orthographic" : ""}`;
 };
 

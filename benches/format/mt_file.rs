@@ -13,5 +13,5 @@ pub fn mt_file(mesh: &TetMesh, kind: MtKind, purpose: Purpose) -> Result<Vec<u8>
     // Other methods know no purpose.
     config.construction = config.construction.with_purpose(purpose).unwrap_or(config.construction);
     let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt;
-    Ok(encode(&mt, &EncodeOptions { block_bits: config.block_bits, ..EncodeOptions::default() })?)
+    Ok(encode(&mt, &EncodeOptions::default())?)
 }

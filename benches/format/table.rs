@@ -90,9 +90,8 @@ fn measure(set: &Set) -> Result<Found> {
     let (decoder, speed) = decode(&edge)?;
     let index = decoder.index().ok_or("no index")?;
     let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
-    let bits = index.block_bits;
     let mt = decoder.mt().ok_or("no MT")?;
-    let mut parts = breakdown(mt, bits).unwrap_or_default();
+    let mut parts = breakdown(mt).unwrap_or_default();
     parts.push(("index", index_bytes as f64));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
     parts.push(("heads", edge.len() as f64 - known));

@@ -178,7 +178,7 @@ fn lengths(text: &str) -> Result<f64> {
 }
 
 /// log2 of the updates of a block.
-fn block_bits(text: &str) -> Result<u32> {
+pub fn block_bits(text: &str) -> Result<u32> {
     let updates: Option<u32> = text.trim().parse().ok();
     let updates = updates.filter(|n| n.is_power_of_two() && (16..=1 << 16).contains(n));
     Ok(updates.context("it must be a power of two from 16 to 65536")?.ilog2())
@@ -318,13 +318,7 @@ fn finish(
     let Some(output) = output else { return Err(anyhow!("-o FILE is missing")) };
     let BuildResult { mt, summary, exact, .. } = result;
     let metadata = options.metadata(config);
-    let options = EncodeOptions {
-        block_bits: config.block_bits,
-        check_margins: true,
-        exact,
-        histograms: true,
-        metadata,
-    };
+    let options = EncodeOptions { check_margins: true, exact, histograms: true, metadata };
     let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let seconds = start.elapsed().as_secs_f64();
     let Report { repaired, repair, angles, .. } = known;

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::format::{EncodeOptions, encode_to};
-use tetralod::mt::{ConvertError, MtKind, MultiTessellation};
+use tetralod::mt::{ConvertError, MtKind, MultiTessellation, UpdatePages};
 
 /// Writes the same updates as an MT of another kind: any kind becomes explicit, and an explicit MT becomes again what
 /// it was made of.
@@ -21,6 +21,10 @@ pub struct Arguments {
     /// The kind of MT that it becomes: half-edge, edge, vertex or explicit.
     #[arg(long, value_name = "KIND", value_parser = build::kind)]
     kind: MtKind,
+    /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: as in the file; of
+    /// another kind 2048, 256 for kind half-edge].
+    #[arg(long, value_name = "N", value_parser = build::block_bits)]
+    block_updates: Option<u32>,
     #[command(flatten)]
     verbosity: Verbosity,
 }
@@ -50,7 +54,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ConvertError::Kinds { to, .. } => anyhow!("{error}, with `tetralod build --kind {}`", to.name()),
         _ => error.into(),
     };
-    let mt = converted.map_err(hint).with_context(|| arguments.file.display().to_string())?;
+    let mut mt = converted.map_err(hint).with_context(|| arguments.file.display().to_string())?;
+    if let Some(bits) = arguments.block_updates.filter(|&bits| bits != mt.page_bits()) {
+        mt = mt.in_pages(bits)?;
+    }
+    mt.find_bounds()?;
     // Conversions keep the numbers of the vertices.
     let exact = opened.session.exact_tables()?;
     let metadata = opened.session.metadata().iter().cloned().collect();

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tetralod::format;
-use tetralod::format::{BlockInfo, ErrorBytes};
+use tetralod::format::{BlockInfo, ErrorBytes, ExactStatus};
 use tetralod::mesh::VectorPart;
 use tetralod::mt::{FieldInfo, MtKind, MultiTessellation, stats};
 use tetralod::refine::Request;
@@ -58,6 +58,8 @@ struct Report {
     full: bool,
     #[serde(flatten)]
     structure: Option<Structure>,
+    /// Whether the file keeps exact values: `none`, `here`, or `missing` where it is cut off.
+    exact_values: &'static str,
     metadata: BTreeMap<String, String>,
 }
 
@@ -196,26 +198,15 @@ fn structure(opened: &Opened) -> Result<(Structure, [[i32; 3]; 2])> {
     Ok((structure, stats.bounds))
 }
 
-/// A box on the lattice that holds all meshes, by the index.
-fn bounds(opened: &Opened) -> Result<[[i32; 3]; 2]> {
-    let index = opened.session.decoder().index().context("the file has no index")?;
-    let of_base = opened.mt()?.base().positions.iter().map(|&p| [p, p]);
-    let all = of_base.chain(index.blocks.iter().map(|block| block.bounds));
-    let both = all.reduce(|[low, high], [from, to]| {
-        [[0, 1, 2].map(|k| low[k].min(from[k])), [0, 1, 2].map(|k| high[k].max(to[k]))]
-    });
-    Ok(both.unwrap_or_default())
-}
-
 fn report(opened: &Opened, is_read: bool) -> Result<Report> {
     let (mt, info) = (opened.mt()?, opened.info()?);
     let base_tetrahedra = mt.base().tets.len();
-    let (structure, bounds) = if is_read {
-        let (structure, bounds) = structure(opened)?;
-        (Some(structure), bounds)
-    } else {
-        (None, bounds(opened)?)
-    };
+    let structure = if is_read { Some(structure(opened)?) } else { None };
+    // Files of the first minor versions do not state it.
+    let found = structure.as_ref().map(|(_, bounds)| bounds.map(|corner| info.lattice.point(corner)));
+    let stated = || opened.session.bounds().map(|bounds| [bounds.min, bounds.max]);
+    let [[x0, y0, z0], [x1, y1, z1]] = found.or_else(stated).context("the file has no base mesh")?;
+    let structure = structure.map(|(structure, _)| structure);
     let field = |(number, field): (usize, &FieldInfo)| {
         let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
         let vector = vector.map(|VectorPart { name, component }| Vector { name, component });
@@ -223,7 +214,6 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
         let (histogram, curve) = (opened.session.decoder().histogram(number), curve(opened, number));
         Field { name, unit, vector, time, min, max, bits, quantization, floor, histogram, curve }
     };
-    let [[x0, y0, z0], [x1, y1, z1]] = bounds.map(|corner| info.lattice.point(corner));
     Ok(Report {
         kind: info.kind.name(),
         updates_are: words(info.kind),
@@ -243,6 +233,7 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
         displacement_per_error: info.displacement_per_error,
         full: is_read,
         structure,
+        exact_values: exact_status(opened).name(),
         metadata: opened.session.metadata().iter().cloned().collect(),
     })
 }
@@ -273,7 +264,7 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     let decoder = opened.session.decoder();
     let index = decoder.index().context("the file has no index")?;
     let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
-    let mut parts = format::breakdown(opened.mt()?, index.block_bits)?;
+    let mut parts = format::breakdown(opened.mt()?)?;
     parts.push(("header, description and index", index_bytes as f64));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
     parts.push(("histograms, heads and ends of sections", opened.bytes as f64 - known));
@@ -283,6 +274,15 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     let part =
         |(name, bytes): (&'static str, f64)| FilePart { name, bytes, bytes_per_vertex: bytes / vertices };
     Ok(parts.into_iter().map(part).collect())
+}
+
+/// Whether the exact values of a file are in it, also where they were not read.
+fn exact_status(opened: &Opened) -> ExactStatus {
+    let decoder = opened.session.decoder();
+    match (decoder.exact_status(), decoder.exact_range()) {
+        (ExactStatus::Missing, Some(range)) if range.end <= opened.bytes => ExactStatus::Here,
+        (status, _) => status,
+    }
 }
 
 /// What the updates of an MT do.
@@ -308,15 +308,15 @@ fn field_row(steps: &[Field]) -> String {
         None => String::new(),
     };
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    let [min, max] = [*min, *max].map(output::number);
+    let [min, max] = output::ends([*min, *max]);
     let worst = rounded(steps.iter().map(|step| step.quantization).fold(0.0, f64::max));
     let last = steps.last().and_then(|step| step.time);
     let time = match (*time, last) {
         (Some(first), Some(last)) if steps.len() > 1 => {
-            let [first, last] = [first, last].map(output::number);
+            let [first, last] = [first, last].map(output::exact);
             format!("; {} times from {first} to {last}", steps.len())
         }
-        (Some(time), _) => format!("; time {}", output::number(time)),
+        (Some(time), _) => format!("; time {}", output::exact(time)),
         _ => String::new(),
     };
     format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
@@ -352,7 +352,8 @@ fn part_row(part: &FilePart, file_bytes: u64) -> String {
 }
 
 fn rows(report: &Report) -> Vec<(&str, String)> {
-    let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
+    let axis = |i: usize| output::ends([report.bounds[i], report.bounds[i + 3]]);
+    let [[x0, x1], [y0, y1], [z0, z1]] = [axis(0), axis(1), axis(2)];
     let structure = report.structure.as_ref();
     let depth = structure.map_or(String::new(), |all| format!(", at most {} deep", output::count(all.depth)));
     let mut rows = vec![
@@ -408,6 +409,12 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
     }
     let parts = structure.iter().flat_map(|all| &all.breakdown);
     rows.extend(parts.map(|part| ("bytes of", part_row(part, report.file_bytes))));
+    if report.exact_values != ExactStatus::None.name() {
+        let is_cut = report.exact_values == ExactStatus::Missing.name();
+        let text =
+            if is_cut { "cut off: the file is shorter than it says" } else { "at the end of the file" };
+        rows.push(("exact values", text.to_owned()));
+    }
     for (key, value) in &report.metadata {
         rows.push((key, value.clone()));
     }

@@ -51,13 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
     files::check_output(output, &parts)?;
     let (BuildResult { mt, summary, exact, .. }, plan) = parts::assemble(folder, verbosity)?;
-    let options = EncodeOptions {
-        block_bits: plan.block_bits(),
-        check_margins: true,
-        exact,
-        histograms: true,
-        metadata: plan.metadata().clone(),
-    };
+    let options =
+        EncodeOptions { check_margins: true, exact, histograms: true, metadata: plan.metadata().clone() };
     let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = Report {
         vertices: summary.vertices,

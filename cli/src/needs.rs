@@ -282,12 +282,11 @@ pub fn warning(session: &Session, stats: &RefineStats, named: &NamedNeed) -> Opt
         Part::Both(region, values) => (Some(region), Some(values)),
         _ => (None, None),
     };
-    let number = output::number;
     if let Some(values) = values {
         let field = &info.fields[values.field];
         let misses = |[low, high]: &[f64; 2]| *high < field.min || *low > field.max;
         if values.ranges.iter().all(misses) {
-            let [min, max] = [number(field.min), number(field.max)];
+            let [min, max] = output::ends([field.min, field.max]);
             return Some(format!("{}: the field has only values from {min} to {max}", named.name));
         }
     }
@@ -296,8 +295,10 @@ pub fn warning(session: &Session, stats: &RefineStats, named: &NamedNeed) -> Opt
     // The boundary of the input may be as far from that of a coarse mesh.
     let near = info.boundary_bound(stats.error_bound);
     region.filter(|region| is_apart(region, &domain, near)).map(|_| {
-        let list = |p: [f64; 3]| p.map(number).join(",");
-        format!("{}: the mesh lies inside the box {},{}", named.name, list(domain.min), list(domain.max))
+        let list = |end: usize| {
+            [0, 1, 2].map(|i| output::ends([domain.min[i], domain.max[i]])[end].clone()).join(",")
+        };
+        format!("{}: the mesh lies inside the box {},{}", named.name, list(0), list(1))
     })
 }
 
@@ -333,21 +334,21 @@ fn is_apart(region: &Region, domain: &Bounds, near: f64) -> bool {
 
 fn describe_values(field: &str, ranges: &[[f64; 2]]) -> String {
     let describe = |[a, b]: &[f64; 2]| {
-        if a == b { output::number(*a) } else { format!("{} to {}", output::number(*a), output::number(*b)) }
+        if a == b { output::exact(*a) } else { format!("{} to {}", output::exact(*a), output::exact(*b)) }
     };
     format!("{field} at {}", ranges.iter().map(describe).collect::<Vec<_>>().join(", "))
 }
 
 fn describe_region(region: &Region) -> String {
-    let list = |numbers: &[f64]| numbers.iter().map(|x| output::number(*x)).collect::<Vec<_>>().join(",");
+    let list = |numbers: &[f64]| numbers.iter().map(|x| output::exact(*x)).collect::<Vec<_>>().join(",");
     match region {
         Region::Box(b) => format!("box {},{}", list(&b.min), list(&b.max)),
         Region::OrientedBox { centre, halves } => {
             format!("oriented box {},{}", list(centre), list(halves.as_flattened()))
         }
-        Region::Sphere { centre, radius } => format!("sphere {},{}", list(centre), output::number(*radius)),
+        Region::Sphere { centre, radius } => format!("sphere {},{}", list(centre), output::exact(*radius)),
         Region::HalfSpace { normal, offset } => {
-            format!("half-space {},{}", list(normal), output::number(*offset))
+            format!("half-space {},{}", list(normal), output::exact(*offset))
         }
         Region::Slab { normal, offset, thickness } => {
             format!("slab {},{}", list(normal), list(&[*offset, *thickness]))

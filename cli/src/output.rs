@@ -95,10 +95,29 @@ pub fn percent(fraction: f64) -> String {
 
 /// A number with six significant digits, for people.
 pub fn number(x: f64) -> String {
-    // Through text, so that the digits dropped leave no trace.
-    let short: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    let plain = short == 0.0 || (1e-4..1e7).contains(&short.abs());
-    if plain { short.to_string() } else { format!("{short:e}") }
+    exact(rounded(x, 5))
+}
+
+/// The number with so many digits behind the first: through text, so that the digits dropped leave no trace.
+fn rounded(x: f64, digits: usize) -> f64 {
+    format!("{x:.digits$e}").parse().unwrap_or(x)
+}
+
+/// A number with all of its digits: it reads back as the same.
+pub fn exact(x: f64) -> String {
+    let plain = x == 0.0 || (1e-4..1e7).contains(&x.abs());
+    if plain { x.to_string() } else { format!("{x:e}") }
+}
+
+/// A number with six significant digits, and more if these leave out a twentieth of `step`: values of a narrow range far from 0.
+pub fn within(x: f64, step: f64) -> String {
+    let is_near = |short: &f64| (short - x).abs() <= 0.05 * step || x.is_nan();
+    exact((5..17).map(|digits| rounded(x, digits)).find(is_near).unwrap_or(x))
+}
+
+/// The ends of a range, with digits that tell them apart.
+pub fn ends([low, high]: [f64; 2]) -> [String; 2] {
+    [low, high].map(|end| within(end, 1e-4 * (high - low)))
 }
 
 #[cfg(test)]
@@ -109,6 +128,13 @@ mod tests {
     fn people_get_short_numbers() {
         let numbers = [0.0, -0.1234567, 1234567.8, 9.173761674e-23, -2.5e9, f64::NAN].map(number);
         assert_eq!(numbers, ["0", "-0.123457", "1234570", "9.17376e-23", "-2.5e9", "NaN"]);
+        assert_eq!(ends([0.123456789, 1.0]), ["0.123457", "1"]);
+        assert_eq!(ends([1.7e9, 1.7e9 + 3.0]), ["1.7e9", "1.700000003e9"]);
+        assert_eq!(within(101_325.000_043_2, 1e-6), "101325.0000432");
+        assert_eq!(
+            [exact(600_000.123_456), exact(5.8e6 + 0.3), exact(f64::NAN)],
+            ["600000.123456", "5800000.3", "NaN"]
+        );
         assert_eq!([0_u32, 999, 1000, 1_234_567].map(count), ["0", "999", "1 000", "1 234 567"]);
         assert_eq!([0, 1023, 1536].map(bytes), ["0 bytes", "1023 bytes", "1.5 KiB (1 536 bytes)"]);
         assert_eq!(percent(0.001), "0.1000 %");

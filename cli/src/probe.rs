@@ -111,7 +111,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         target.write_either(&poly_data(&found, &columns, &answer)?, &table(&found, &names, &columns))?;
     }
     let report = report(arguments, &found, &names, &columns);
-    arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
+    // Digits that the bound of the mesh leaves without a meaning are not shown.
+    let info = answer.opened.info()?;
+    let steps = info.fields.iter().enumerate().map(|(f, field)| {
+        let bound = info.field_bound(f, answer.stats.error_bound);
+        (field.name.clone(), if bound > 0.0 { bound.min(1e-4 * field.range()) } else { field.step })
+    });
+    let rows = rows(arguments, &report, &steps.collect());
+    arguments.query.print(&report, rows, (&answer.summary, seconds))
 }
 
 fn look(arguments: &Arguments, mesh: MeshView<'_>) -> Result<Samples> {
@@ -250,7 +257,8 @@ fn report(arguments: &Arguments, found: &Samples, names: &[String], columns: &[V
     }
 }
 
-fn rows(arguments: &Arguments, report: &Report) -> Vec<(String, String)> {
+/// `steps`: by field, how much counts of a value.
+fn rows(arguments: &Arguments, report: &Report, steps: &BTreeMap<String, f64>) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     if let Some(target) = &arguments.output {
         lines.push(("file".to_owned(), target.path.display().to_string()));
@@ -261,10 +269,12 @@ fn rows(arguments: &Arguments, report: &Report) -> Vec<(String, String)> {
         lines.extend(length.map(|length| (name.to_owned(), output::number(length))));
     }
     for (point, values) in arguments.what.points.iter().zip(&report.values) {
-        let at = point.map(output::number).join(",");
+        let at = point.map(output::exact).join(",");
         match values {
             Some(values) => {
-                lines.extend(values.iter().map(|(name, v)| (format!("{name} at {at}"), output::number(*v))));
+                let shown =
+                    |(name, v): (&String, &f64)| output::within(*v, steps.get(name).copied().unwrap_or(0.0));
+                lines.extend(values.iter().map(|each| (format!("{} at {at}", each.0), shown(each))));
             }
             None => lines.push((at, "outside".to_owned())),
         }

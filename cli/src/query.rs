@@ -11,7 +11,8 @@ use serde::Serialize;
 use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tetralod::client::{Client, Step};
+use tetralod::client::{Client, ClientError, Step};
+use tetralod::format::FormatError;
 use tetralod::io::{PointValues, PolyData};
 use tetralod::mt::{FieldInfo, MtInfo, UpdatePages};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
@@ -116,9 +117,18 @@ impl Query {
         self.answer_with(|_| Ok(()))
     }
 
-    /// [`Query::answer`] with the exact values that the file keeps.
+    /// [`Query::answer`] with the exact values that the file keeps, and a warning if they are cut off.
     pub fn answer_exactly(&self) -> Result<Answer> {
-        self.answer_with(|client| Ok(client.fetch_exact()?))
+        self.answer_with(|client| match client.fetch_exact() {
+            Err(ClientError::Format(FormatError::Truncated { .. })) => {
+                let file = self.file.display();
+                eprintln!(
+                    "warning: {file}: the exact values that the file keeps are cut off; the values are those of the lattices, as                      `tetralod info` bounds them"
+                );
+                Ok(())
+            }
+            fetched => Ok(fetched?),
+        })
     }
 
     fn answer_with(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {

@@ -193,7 +193,7 @@ impl Colours {
     }
 
     fn sentence(&self) -> String {
-        let [low, high] = self.range.map(output::number);
+        let [low, high] = output::ends(self.range);
         let log = if self.log { ", logarithmic" } else { "" };
         let reversed = if self.reversed { ", reversed" } else { "" };
         format!("{} from {low} to {high} ({}{log}{reversed})", self.of, self.map)

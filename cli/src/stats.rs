@@ -183,9 +183,9 @@ fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
     let mut rows = vec![
         ("volume", output::number(numbers.volume)),
         ("integral", output::number(numbers.integral)),
-        ("mean", output::number(numbers.mean)),
+        ("mean", output::within(numbers.mean, 1e-4 * (numbers.max - numbers.min))),
         ("deviation", output::number(numbers.standard_deviation)),
-        ("range", format!("{} to {}", output::number(numbers.min), output::number(numbers.max))),
+        ("range", output::ends([numbers.min, numbers.max]).join(" to ")),
     ];
     if let Some(reference) = &report.reference {
         rows.push(("reference", format!("integral {}", output::number(reference.found.integral))));
@@ -205,7 +205,7 @@ fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
         rows.push(("below", share(*below)));
     }
     for (ends, volume) in edges.windows(2).zip(volumes).take(100) {
-        let ends = format!("{} to {}", output::number(ends[0]), output::number(ends[1]));
+        let ends = output::ends([ends[0], ends[1]]).join(" to ");
         rows.push(("bin", format!("{ends}: {}", share(*volume))));
     }
     if counts(*above) {

@@ -42,8 +42,8 @@ fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Box<dyn Error>> 
 fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     let mut files = Vec::new();
     let mut put = |name: &str, mt: &Mt, block_bits: u32| -> Result<(), Box<dyn Error>> {
-        let options = EncodeOptions { block_bits, ..EncodeOptions::default() };
-        files.push((format!("{name}-{block_bits}"), encode(mt, &options)?));
+        let mt = mt.in_pages(block_bits)?;
+        files.push((format!("{name}-{block_bits}"), encode(&mt, &EncodeOptions::default())?));
         Ok(())
     };
     for (model, size) in [("bucky", 4), ("bucky", 6), ("sphere-flow", 5)] {

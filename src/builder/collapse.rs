@@ -17,7 +17,7 @@ use super::{
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::{EDGES, TetMesh, Topology};
-use crate::mt::{EdgeMt, ErrorCode, MAX_UPDATES, MtInfo, MtKind, MultiTessellation};
+use crate::mt::{EdgeMt, ErrorCode, MAX_UPDATES, MtInfo, MultiTessellation};
 
 /// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
 ///
@@ -46,16 +46,7 @@ pub fn edge_mt(
     let quantized = quantize::quantize_cells(mesh, config)?;
     frozen.iter_mut().zip(kept_points(config, mesh)?).for_each(|(frozen, kept)| *frozen |= kept);
     let diagonal = Bounds::of(&mesh.positions).diagonal();
-    let info = MtInfo {
-        kind: MtKind::Edge,
-        lattice: quantized.lattice,
-        fields: quantized.fields.clone(),
-        vertices: mesh.positions.len() as u32,
-        tetrahedra: mesh.tets.len() as u32,
-        updates: 0,
-        displacement_per_error: config.displacement * diagonal,
-        quantization: quantized.quantization,
-    };
+    let info = quantized.info(mesh.tets.len(), config.displacement * diagonal);
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
     let reference = Reference::new(&quantized, &work, info.displacement_per_error, config.displacement_edges);
     let mut builder = Builder::new(work, reference, &info, frozen);

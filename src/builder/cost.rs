@@ -185,6 +185,10 @@ impl Evaluator {
             // Where it is flat, no point of the boundary gets further away than it is.
             let border = self.place_on_border(buckets, input);
             self.placement.raise(border);
+            if largest(&self.placement.errors) <= limit {
+                let chords = self.chords(input);
+                self.placement.raise(chords);
+            }
         }
         let Self { placement, star, old_border, .. } = self;
         let new = (input, &*star);
@@ -330,6 +334,16 @@ impl Evaluator {
         reference.error_from(self.foot, less.min(distance))
     }
 
+    /// How far the middles of the new boundary triangles and of their edges are from the reference boundary, as an error.
+    fn chords(&self, input: Input<'_>) -> f64 {
+        let Input { data, reference, .. } = input;
+        let foot = |v: u32| if v == NONE { self.foot } else { data.foot[v as usize] };
+        let new = (input, &self.star);
+        self.star.border[..self.at_centre].iter().fold(0.0, |largest, &(_, triangle)| {
+            reference.chord(triangle.map(|v| new.corner(v)), triangle.map(foot), largest)
+        })
+    }
+
     /// Finds where the reference vertices of the boundary go. Returns the largest error of their distances.
     fn place_on_border(&mut self, buckets: &Buckets, input: Input<'_>) -> f64 {
         let Input { collapse, reference, .. } = input;
@@ -429,6 +443,22 @@ impl<'a> Reference<'a> {
     /// What a displacement from a triangle of the reference boundary counts as.
     pub fn error_from(&self, triangle: u32, distance: f64) -> f64 {
         if distance > 0.0 { distance / self.allowance_from(triangle) } else { 0.0 }
+    }
+
+    /// How far the middles of a boundary triangle and of its edges are from the reference boundary, as an error, or `largest` if that
+    /// is more. `from` are triangles of that boundary near the corners; [`NONE`] where none is known.
+    pub fn chord(&self, [a, b, c]: [DVec3; 3], from: [u32; 3], mut largest: f64) -> f64 {
+        for p in [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5] {
+            let mut least = f64::INFINITY;
+            for from in from.into_iter().filter(|&from| from != NONE) {
+                if least > largest {
+                    let (foot, distance) = self.boundary.walk(p, from, largest * self.allowance_from(from));
+                    least = least.min(self.error_from(foot, distance));
+                }
+            }
+            largest = largest.max(least);
+        }
+        largest
     }
 
     /// The displacement from a triangle of the reference boundary that counts as an error of 1.

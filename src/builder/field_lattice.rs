@@ -1,5 +1,6 @@
 //! The lattices of the fields: as coarse as the configuration allows.
 
+use super::position_lattice::is_ordinary;
 use super::{BuildConfig, BuildError, FieldPrecision};
 use crate::mesh::Field;
 use crate::mt::{FieldInfo, MAX_FIELD_BITS};
@@ -12,6 +13,10 @@ pub(super) fn field_lattices(fields: &[&Field], config: &BuildConfig) -> Result<
     let mut infos = Vec::with_capacity(fields.len());
     for steps in fields.chunk_by(|a, b| a.name == b.name) {
         let shared = shared_lattice(steps, config)?;
+        if !is_ordinary(shared.origin, shared.step, shared.bits) {
+            let field = Some(shared.name);
+            return Err(BuildError::Scale { field, step: shared.step, origin: shared.origin });
+        }
         for &field in steps {
             infos.push(FieldInfo {
                 unit: field.unit.clone(),
@@ -43,7 +48,7 @@ fn shared_lattice(steps: &[&Field], config: &BuildConfig) -> Result<FieldInfo, B
         min,
         max,
         origin: min,
-        // A range of subnormal size has no smaller step.
+        // A range of subnormal size has no smaller step; it is refused.
         step: (range / f64::from((1_u32 << bits) - 1)).max(f64::from_bits(1)),
         bits,
         ..FieldInfo::default()

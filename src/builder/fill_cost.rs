@@ -211,20 +211,8 @@ fn border_points(buckets: &Buckets, hole: &Hole) -> impl Iterator<Item = u32> {
 /// How far the middles of the new boundary triangles and of their edges are from the reference boundary, as an error.
 /// Their corners are on it.
 fn chords(filling: &Filling, reference: &Reference<'_>) -> f64 {
-    let mut largest = 0.0_f64;
-    for &(_, triangle) in &filling.border[..filling.moved] {
-        let [a, b, c] = triangle.map(|v| reference.position(v));
-        for p in [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5] {
-            let mut least = f64::INFINITY;
-            for v in triangle {
-                if let Some(&from) = reference.boundary.at(v).first().filter(|_| least > largest) {
-                    let (foot, distance) =
-                        reference.boundary.walk(p, from, largest * reference.allowance_from(from));
-                    least = least.min(reference.error_from(foot, distance));
-                }
-            }
-            largest = largest.max(least);
-        }
-    }
-    largest
+    filling.border[..filling.moved].iter().fold(0.0, |largest, &(_, triangle)| {
+        let from = triangle.map(|v| reference.boundary.at(v).first().copied().unwrap_or(NONE));
+        reference.chord(triangle.map(|v| reference.position(v)), from, largest)
+    })
 }

@@ -3,8 +3,9 @@
 use super::delaunay::shifted;
 use super::hole::{Filling, Hole, sorted};
 use super::points::as_vec;
+use super::work_mesh::{LARGEST_STAR, StarTet, TetSet, WorkMesh};
 use crate::geom::{in_conflict, orient3d};
-use crate::mesh::{FACES, NONE};
+use crate::mesh::{EDGES, FACES, NONE};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -168,6 +169,55 @@ impl Height {
             + b.over.slack * a.side.slack;
         Near { value: b.over.value * a.side.value - a.over.value * b.side.value, slack }.sign()
     }
+}
+
+/// Scratch space of [`is_new`].
+#[derive(Default)]
+pub(super) struct Around {
+    edges: Vec<Vec<u32>>,
+    seen: TetSet,
+    star: Vec<StarTet>,
+}
+
+/// Whether no tetrahedron outside of the hole has an edge or a triangle that a filling adds. Where the boundary overlaps itself, one
+/// may: then the mesh would come to touch itself where it has not. Only vertices for which `may_overlap` holds can belong to it; at
+/// others the tetrahedra around fill the space once. None if there was nothing to look for. `degrees` are how many tetrahedra there are
+/// around each vertex.
+pub(super) fn is_new(
+    (hole, filling): (&Hole, &Filling),
+    (mesh, degrees): (&WorkMesh, &[u32]),
+    may_overlap: impl Fn(u32) -> bool,
+    Around { edges: added, seen, star }: &mut Around,
+) -> Option<bool> {
+    added.clear();
+    for tet in &filling.tets {
+        let is_old = |[x, y]: [u32; 2]| match [x, y].map(|v| hole.place(v)) {
+            [Some(x), Some(y)] => hole.has_edge(x, y),
+            _ => true,
+        };
+        let corners = |places: &[usize]| places.iter().map(|&k| tet[k]).collect::<Vec<u32>>();
+        let edges = EDGES.iter().filter(|edge| !is_old(edge.map(|k| tet[k]))).map(|edge| corners(edge));
+        // A triangle with a new edge is new if that is.
+        let of_old = |[x, y, z]: [u32; 3]| [[x, y], [y, z], [z, x]].into_iter().all(is_old);
+        let in_hole = |face: [u32; 3]| hole.faces_with(face.iter()) != 0;
+        let faces = FACES.iter().filter(|face| {
+            let face = face.map(|k| tet[k]);
+            of_old(face) && !in_hole(face)
+        });
+        added.extend(edges.chain(faces.map(|face| corners(face))));
+    }
+    added.retain(|vertices| vertices.iter().all(|&v| may_overlap(v)));
+    added.iter_mut().for_each(|vertices| vertices.sort_unstable());
+    added.sort_unstable();
+    added.dedup();
+    let mut is_nowhere = |vertices: &Vec<u32>| {
+        let mut whole =
+            |&&v: &&u32| mesh.star(v, LARGEST_STAR, seen, star) && star.len() == degrees[v as usize] as usize;
+        // Where it touches itself already, not all tetrahedra around a vertex are found by going through faces.
+        vertices.iter().find(&mut whole).is_some()
+            && star.iter().all(|s| vertices.iter().any(|v| !mesh.tets[s.tet as usize].contains(v)))
+    };
+    (!added.is_empty()).then(|| added.iter().all(&mut is_nowhere))
 }
 
 /// Whether two orders of a triangle's corners are those seen from its two sides.

@@ -89,16 +89,26 @@ pub(super) struct Nearby {
     flags: Vec<u8>,
     seen: TetSet,
     star: Vec<StarTet>,
+    /// The star of a vertex of the link.
+    other: Vec<StarTet>,
 }
 
 /// The link condition for the edge to the link vertex `i`, with the boundary closed by a cone from a vertex ω outside.
 /// (Dey, Edelsbrunner, Guha, Nekhayev: *Topology preserving edge contraction*, 1999.)
-pub(super) fn keeps_topology(hole: &Hole, mesh: &WorkMesh, scratch: &mut Nearby, i: usize) -> bool {
-    let Nearby { flags, seen, star } = scratch;
+///
+/// `degrees` are how many tetrahedra there are around each vertex.
+pub(super) fn keeps_topology(
+    hole: &Hole,
+    mesh: &WorkMesh,
+    degrees: &[u32],
+    scratch: &mut Nearby,
+    i: usize,
+) -> bool {
     let b = hole.link[i];
-    if !mesh.star(b, LARGEST_STAR, seen, star) {
+    if !find_star(hole, mesh, degrees, scratch, b) {
         return false;
     }
+    let Nearby { flags, star, .. } = scratch;
     flag(hole, flags, i);
     let has_border = |x: u32, y: u32| hole.border.iter().any(|&edge| edge == [x, y] || edge == [y, x]);
     for &StarTet { tet, corner } in star.iter() {
@@ -122,6 +132,32 @@ pub(super) fn keeps_topology(hole: &Hole, mesh: &WorkMesh, scratch: &mut Nearby,
             let pinches = |m: u8| m & (BORDER_A | FAN_END) == BORDER_A;
             if around[k] == NONE && (pinches(m) || pinches(n) || has_border(corners[x], corners[y])) {
                 return false;
+            }
+        }
+    }
+    true
+}
+
+/// Finds the tetrahedra around `b`, or where the boundary touches itself there at least all of them that have another vertex of the
+/// link: only these decide. False if they cannot be found by going through faces.
+fn find_star(hole: &Hole, mesh: &WorkMesh, degrees: &[u32], scratch: &mut Nearby, b: u32) -> bool {
+    let Nearby { seen, star, other, .. } = scratch;
+    if !mesh.star(b, LARGEST_STAR, seen, star) {
+        return false;
+    }
+    if star.len() == degrees[b as usize] as usize {
+        return true;
+    }
+    for &v in hole.link.iter().filter(|&&v| v != b) {
+        if !mesh.star(v, LARGEST_STAR, seen, other) || other.len() < degrees[v as usize] as usize {
+            return false;
+        }
+        for &StarTet { tet, .. } in other.iter() {
+            let corner = mesh.tets[tet as usize].iter().position(|&corner| corner == b);
+            if let Some(corner) = corner
+                && star.iter().all(|known| known.tet != tet)
+            {
+                star.push(StarTet { tet, corner: corner as u8 });
             }
         }
     }

@@ -9,7 +9,7 @@ use super::{BuildError, BuildProgress, OnProgress};
 use crate::mesh::NONE;
 use crate::mt::{
     ApplyUpdates, CurrentMesh, EdgeMt, EdgeMtBuilder, ErrorCode, Margins, MtInfo, MultiTessellation,
-    UpdateError, UpdateId, VertexId, VertexSplit,
+    UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
 };
 use std::cmp::Reverse;
 
@@ -42,7 +42,7 @@ impl Collapse {
 }
 
 /// The MT of a history, with its updates in the order that [`Updates::order`] gives them, and its vertex for each reference
-/// point. Blocks have `2^block_bits` updates, 4 to 16 bits.
+/// point. Pages have `2^block_bits` updates, 4 to 16 bits.
 pub(super) fn edge_mt(
     mut info: MtInfo,
     base: &WorkMesh,
@@ -51,6 +51,7 @@ pub(super) fn edge_mt(
     block_bits: u32,
     progress: OnProgress<'_>,
 ) -> Result<(EdgeMt, Vec<VertexId>), BuildError> {
+    let block_bits = block_bits.clamp(4, 16);
     info.updates = history.len() as u32;
     // Errors are monotone, so this extends the partial order, as far as equal errors leave it open by the collapses
     // reversed.
@@ -68,11 +69,16 @@ pub(super) fn edge_mt(
         sites: &found.sites,
         bits,
     };
-    let order: Vec<u32> =
-        updates.order(block_bits.clamp(4, 16)).into_iter().map(|u| falling[u as usize]).collect();
+    let order: Vec<u32> = updates.order(block_bits).into_iter().map(|u| falling[u as usize]).collect();
     drop(first);
     replay.restore_margins(&falling, &found);
-    replay.make(info, &order, None, progress)
+    let (mt, vertices) = replay.make(info, &order, None, progress)?;
+    let mt = if mt.page_bits() == block_bits {
+        mt
+    } else {
+        mt.in_pages(block_bits).map_err(BuildError::Internal)?
+    };
+    Ok((mt, vertices))
 }
 
 /// The errors that files hold, by collapse and field: rounded up to few digits.

@@ -151,7 +151,10 @@ fn is_sheet(edges: &[[u32; 2]]) -> bool {
 /// sheets would be laid onto each other.
 fn keeps_topology((hole, b): (&Hole, u32), edges: &[[u32; 2]], mesh: &WorkMesh, regions: &[u32]) -> bool {
     let mut star = Vec::new();
-    if !mesh.star(b, LARGEST_STAR, &mut TetSet::default(), &mut star) {
+    let Some(first) = hole.star.iter().map(|s| s.tet).find(|&t| mesh.tets[t as usize].contains(&b)) else {
+        return false;
+    };
+    if !mesh.star_from(first, b, LARGEST_STAR, &mut TetSet::default(), &mut star) {
         return false;
     }
     let beside: Vec<u32> =

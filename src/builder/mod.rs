@@ -82,7 +82,8 @@ pub use remedy::Remedy;
 
 use crate::mesh::{InputCell, MeshError, TetMesh};
 use crate::mt::{
-    ConvertError, Exact, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
+    ConvertError, Exact, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateError, UpdateId, UpdatePages,
+    VertexId,
 };
 use std::borrow::Cow;
 use std::ops::ControlFlow;
@@ -134,8 +135,8 @@ pub struct BuildConfig {
     pub preserve_within: f64,
     /// Places of points of the mesh that stay in all meshes, in model units. Not by [`Method::Insert`].
     pub keep_points: Vec<[f64; 3]>,
-    /// log2 of the updates that files are going to have in a block, 4 to 16: within a block of an edge-based MT updates are
-    /// numbered so that they take few bits. Encode with the same.
+    /// log2 of the updates that pages of the MT, and so the blocks of its file, are going to have, 4 to 16: within a page of an
+    /// edge-based MT updates are numbered so that they take few bits.
     pub block_bits: u32,
 }
 
@@ -311,6 +312,16 @@ pub enum BuildError {
         /// The field.
         field: String,
     },
+    /// Coordinates, or the values of a field, are so small or so large that double precision cannot compute with them.
+    #[error("{}", scale_message(.field.as_deref(), *.step, *.origin))]
+    Scale {
+        /// The field; none for positions.
+        field: Option<String>,
+        /// The step of the lattice that they would be put on.
+        step: f64,
+        /// The smallest one.
+        origin: f64,
+    },
     /// The finest lattice moves positions, or values, by more than the tolerance.
     #[error("{}", tolerance_message(.field.as_deref(), *.reached))]
     Tolerance {
@@ -380,6 +391,14 @@ pub enum BuildError {
     /// The finished MT failed its own check: a bug in the builder, not in the input.
     #[error("the built MT is not sound ({0}); please report this")]
     Internal(UpdateError),
+}
+
+fn scale_message(field: Option<&str>, step: f64, origin: f64) -> String {
+    let what = field.map_or("the coordinates".to_owned(), |field| format!("the values of field '{field}'"));
+    format!(
+        "{what} are too small or too large to compute with in double precision (from {origin:e} on, in steps of {step:e}; steps are to be \
+         at least 1e-51, numbers at most 1e51): scale them, as by using another unit"
+    )
 }
 
 fn tolerance_message(field: Option<&str>, reached: f64) -> String {
@@ -469,10 +488,13 @@ fn build_cow(
         }
     };
     // Conversions keep the numbers of the vertices.
-    match result.mt.info().kind == kind {
-        true => Ok(result),
-        false => Ok(BuildResult { mt: result.mt.convert(kind)?, ..result }),
-    }
+    let mt = match result.mt.info().kind == kind {
+        true => result.mt,
+        false => result.mt.convert(kind)?,
+    };
+    let bits = config.block_bits.clamp(4, 16);
+    let mt = if mt.page_bits() == bits { mt } else { mt.in_pages(bits).map_err(BuildError::Internal)? };
+    Ok(BuildResult { mt, ..result })
 }
 
 /// The half-edge MT of `mesh`, its updates in blocks by what they reach.

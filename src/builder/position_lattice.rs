@@ -10,6 +10,31 @@ pub(super) const FEWEST_BITS: u32 = 16;
 /// Bits added to the fewest that keep every cell positive, so that thin cells keep their shape, too.
 pub(super) const SPARE_BITS: u32 = 2;
 
+/// The smallest step of a lattice and the largest coordinate or value, as powers of 2: the squares of volumes are still ordinary numbers in
+/// double precision, and so is all that meshes are measured by.
+const ORDINARY: [f64; 2] = [f64::from_bits((1023 - 170) << 52), f64::from_bits((1023 + 170) << 52)];
+
+/// Whether double precision can compute with a lattice of so many bits along an axis.
+pub(super) fn is_ordinary(origin: f64, step: f64, bits: u32) -> bool {
+    let [smallest, largest] = ORDINARY;
+    let end = origin + step * f64::from(1_u32 << bits);
+    step >= smallest && origin.abs() <= largest && end.abs() <= largest
+}
+
+/// Refuses points on which no lattice would do, before cells are said to be too thin for one.
+pub(super) fn check_points(mesh: &TetMesh) -> Result<(), BuildError> {
+    if mesh.positions.is_empty() { Ok(()) } else { check_scale(&lattice(mesh, FEWEST_BITS)) }
+}
+
+/// Refuses lattices that double precision cannot compute with.
+pub(super) fn check_scale(lattice: &Lattice) -> Result<(), BuildError> {
+    let is_ordinary = |k: usize| is_ordinary(lattice.origin[k], lattice.step[k], lattice.bits);
+    match (0..3).find(|&k| !is_ordinary(k)) {
+        None => Ok(()),
+        Some(k) => Err(BuildError::Scale { field: None, step: lattice.step[k], origin: lattice.origin[k] }),
+    }
+}
+
 /// Points on a lattice.
 pub(super) struct Placed {
     pub lattice: Lattice,

@@ -5,7 +5,7 @@ use super::places::Places;
 use super::points::{as_vec, clamped};
 use super::position_lattice::Placed;
 use super::{BuildConfig, BuildError, field_lattice, field_selection, location, position_lattice};
-use crate::geom::{Lattice, ON_LATTICE, WIDE_BITS};
+use crate::geom::{Lattice, ON_LATTICE, WIDE_BITS, lattice_box};
 use crate::mesh::{EDGES, Field, TetMesh};
 use crate::mt::{FieldInfo, MtInfo, MtKind};
 use glam::DVec3;
@@ -60,6 +60,7 @@ impl Quantized {
             updates: 0,
             displacement_per_error,
             quantization: self.quantization,
+            bounds: lattice_box(self.positions.iter().copied()),
         }
     }
 
@@ -180,7 +181,9 @@ pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     }
     let chosen = field_selection::fields(mesh, config)?;
     check_finite(mesh, &chosen)?;
+    position_lattice::check_points(mesh)?;
     let placed = position_lattice::place(mesh, config)?;
+    position_lattice::check_scale(&placed.lattice)?;
     let fields = field_lattice::field_lattices(&chosen, config)?;
     Ok(on_lattices(mesh, placed, &chosen, fields))
 }
@@ -229,6 +232,7 @@ pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
         }
         let finer = BuildConfig { position_bits: Some(bits), ..config.clone() };
         let Ok(placed) = position_lattice::place(mesh, &finer) else { break };
+        position_lattice::check_scale(&placed.lattice)?;
         let Quantized { fields, levels, exact, .. } = quantized;
         quantized = Quantized::new(mesh, placed, fields, levels, exact);
         quantized.locations = location::locations(&mesh.tets, &quantized.positions, &quantized.places)?;

@@ -5,7 +5,7 @@
 use super::candidate_queue::{Key, Levels};
 use super::cost::{Buckets, Reference, largest};
 use super::fill_cost::{FillCost, HoleCost, Input, Removals};
-use super::gift_wrap::GiftWrap;
+use super::gift_wrap::{Around, GiftWrap, is_new};
 use super::half_edge::{Nearby, contract, keeps_topology, may_contract};
 use super::hole::{Filling, Hole};
 use super::points::{as_vec, squared_length};
@@ -127,6 +127,9 @@ pub(super) struct RemovalSearch {
     pub hole: Hole,
     hole_cost: HoleCost,
     nearby: Nearby,
+    around: Around,
+    /// Whether the filling that `best` is depends on tetrahedra outside of the hole.
+    looked_around: bool,
     /// Link vertices with the predicted error of contracting the edge to them, and their places in the link: see [`end`].
     ends: Vec<u128>,
     /// The filling that is evaluated, and the best one so far.
@@ -170,6 +173,8 @@ impl RemovalSearch {
             hole: Hole::default(),
             hole_cost: HoleCost::default(),
             nearby: Nearby::default(),
+            around: Around::default(),
+            looked_around: false,
             ends: Vec::new(),
             now: Candidate::default(),
             best: Candidate::default(),
@@ -194,6 +199,7 @@ impl RemovalSearch {
     pub fn is_stale(&self, state: &State<'_>) -> bool {
         // What is kept apart, and what the boundary moves over, may be anywhere; the topology depends on the star of the other end.
         state.restrictions.look_beyond_holes()
+            || self.looked_around
             || !self.best.cost.is_flat()
             || state.version(self.best_end) != self.version_of_end
     }
@@ -283,12 +289,12 @@ impl RemovalSearch {
         }
         // Whether the topology is kept depends on the whole star of `b`.
         let stays = state.is_open(b) || hole.on_boundary() && state.frozen[b as usize];
-        !stays && keeps_topology(hole, &state.mesh, nearby, i)
+        !stays && keeps_topology(hole, &state.mesh, &state.degrees, nearby, i)
     }
 
     /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
     fn wrap(&mut self, state: &State<'_>, level: u16) -> Option<Key> {
-        let Self { hole, hole_cost, best, gift_wrap, .. } = self;
+        let Self { hole, hole_cost, best, gift_wrap, around, looked_around, .. } = self;
         let positions = &state.reference.quantized.positions;
         if !gift_wrap.as_mut()?.fill(hole, positions, &mut best.filling)
             || hole.tilts_flat(&best.filling, positions)
@@ -298,6 +304,13 @@ impl RemovalSearch {
         }
         // A removal must make the mesh smaller: a finer mesh is then a larger one, which budgets rely on.
         if best.filling.tets.len() >= hole.star.len() {
+            return None;
+        }
+        let on_boundary = |v: u32| !state.reference.boundary.at(v).is_empty();
+        let mesh = (&state.mesh, &state.degrees[..]);
+        let is_new = is_new((hole, &best.filling), mesh, on_boundary, around);
+        *looked_around = is_new.is_some();
+        if is_new == Some(false) {
             return None;
         }
         let limit = state.levels.largest(level);

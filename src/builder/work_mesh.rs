@@ -172,9 +172,20 @@ impl WorkMesh {
     /// The tetrahedra around `v` that are connected through faces; false if there are more than `most`, which is at most
     /// [`LARGEST_STAR`].
     pub fn star(&self, v: u32, most: usize, seen: &mut TetSet, star: &mut Vec<StarTet>) -> bool {
+        self.star_from(self.incident[v as usize], v, most, seen, star)
+    }
+
+    /// The same of those that are connected with `first`: where the boundary touches itself, there may be others.
+    pub fn star_from(
+        &self,
+        first: u32,
+        v: u32,
+        most: usize,
+        seen: &mut TetSet,
+        star: &mut Vec<StarTet>,
+    ) -> bool {
         seen.clear();
         star.clear();
-        let first = self.incident[v as usize];
         seen.insert(first);
         seen.note(0, self.neighbors[first as usize], 0);
         star.push(self.star_tet(first, v));

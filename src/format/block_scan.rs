@@ -11,10 +11,8 @@ use std::collections::BTreeSet;
 
 /// What a run through an MT has found.
 pub struct BlockScan {
-    /// The blocks of `2^block_bits` updates; their lengths are not known yet.
+    /// The blocks, which are the pages of the MT; their lengths are not known yet.
     pub blocks: Vec<BlockInfo>,
-    /// The MT with blocks for pages, if its pages were others.
-    pub in_blocks: Option<Mt>,
     /// For each vertex of the reference mesh, ascending, its number and its levels; empty if no exact values are to be written.
     pub reference: Vec<(u32, Vec<i32>)>,
     /// Of that mesh, if they are to be written.
@@ -23,15 +21,12 @@ pub struct BlockScan {
 
 impl BlockScan {
     pub fn of(mt: &Mt, options: &EncodeOptions) -> Result<Self, EncodeError> {
-        let bits = options.block_bits;
-        let is_other = mt.is_paged() && mt.page_bits() != bits;
         if let Mt::HalfEdge(mt) = mt
-            && let Some(facts) = mt.facts().filter(|_| !is_other && options.exact.is_empty())
+            && let Some(facts) = mt.facts().filter(|_| options.exact.is_empty())
         {
             return by_facts(mt, facts, options);
         }
-        let in_blocks = is_other.then(|| mt.in_pages(bits)).transpose().map_err(EncodeError::Update)?;
-        Ok(Self { in_blocks, ..run(mt, options)? })
+        run(mt, options)
     }
 }
 
@@ -43,8 +38,7 @@ fn by_facts(mt: &HalfEdgeMt, facts: &MtFacts, options: &EncodeOptions) -> Result
     }
     let fields = mt.info().fields.len();
     let block = |(block, &bounds): (usize, &[[i32; 3]; 2])| {
-        let first = (block as u32) << options.block_bits;
-        let updates = first..mt.updates().min(first + (1 << options.block_bits));
+        let updates = mt.page_updates(block as u32);
         let largest = |f: usize| updates.clone().map(|u| mt.error_of_field(UpdateId(u), f)).max();
         BlockInfo {
             bounds,
@@ -55,7 +49,6 @@ fn by_facts(mt: &HalfEdgeMt, facts: &MtFacts, options: &EncodeOptions) -> Result
     };
     Ok(BlockScan {
         blocks: facts.bounds.iter().enumerate().map(block).collect(),
-        in_blocks: None,
         reference: Vec::new(),
         histograms: options.histograms.then(|| Histograms::of(&facts.volumes)),
     })
@@ -71,11 +64,8 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
     mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
     let mut blocks = Vec::new();
-    let mut first = 0;
-    while first < mt.updates() {
-        let end = mt.updates().min(first + (1 << options.block_bits));
-        blocks.push(scan_block(mt, &mut mesh, first..end, options, &mut margins)?);
-        first = end;
+    for page in 0..mt.updates().div_ceil(1 << mt.page_bits()) {
+        blocks.push(scan_block(mt, &mut mesh, mt.page_updates(page), options, &mut margins)?);
     }
     mesh.compact();
     let histograms = options.histograms.then(|| Histograms::of(&level_volumes(mt.info(), &mesh)));
@@ -84,7 +74,7 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
     let mut reference: Vec<(u32, Vec<i32>)> =
         slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
     reference.sort_unstable();
-    Ok(BlockScan { blocks, in_blocks: None, reference, histograms })
+    Ok(BlockScan { blocks, reference, histograms })
 }
 
 fn scan_block(
@@ -101,7 +91,7 @@ fn scan_block(
         ranges: vec![[i32::MAX, i32::MIN]; fields],
         ..BlockInfo::default()
     };
-    let own = updates.start >> options.block_bits;
+    let own = updates.start >> mt.page_bits();
     let mut parents = BTreeSet::new();
     let (mut tets, mut vertices) = (Vec::new(), Vec::new());
     for u in updates.map(UpdateId) {
@@ -117,8 +107,7 @@ fn scan_block(
         }
         // Else each block can be used without the others.
         if mt.needs_parents() {
-            parents
-                .extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> options.block_bits));
+            parents.extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> mt.page_bits()));
         }
         widen(&mut block, mesh, &tets, &mut vertices);
         match mt.refine(mesh, u).map_err(EncodeError::Update)? {

@@ -16,10 +16,8 @@ use std::ops::Range;
 use thiserror::Error;
 
 /// What goes into a file besides the MT.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct EncodeOptions {
-    /// log2 of the updates of a block, 4 to 16: the least that a client can fetch of the file by itself.
-    pub block_bits: u32,
     /// Refuse an MT whose errors do not fall along its partial order by as much as requests for values rely on, too; errors that
     /// grow are always refused. What the builders make passes.
     pub check_margins: bool,
@@ -31,21 +29,6 @@ pub struct EncodeOptions {
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
     pub metadata: BTreeMap<String, String>,
 }
-
-impl Default for EncodeOptions {
-    fn default() -> Self {
-        Self {
-            block_bits: BLOCK_BITS,
-            check_margins: false,
-            exact: Vec::new(),
-            histograms: false,
-            metadata: BTreeMap::new(),
-        }
-    }
-}
-
-/// log2 of the updates of a block, unless the caller says otherwise.
-pub const BLOCK_BITS: u32 = 11;
 
 /// Why an MT cannot be written.
 #[derive(Debug, Error)]
@@ -61,10 +44,10 @@ pub enum EncodeError {
         /// Updates by the description.
         expected: u32,
     },
-    /// No block can have so many updates.
-    #[error("a block cannot hold 2^{bits} updates; choose 4 to 16")]
+    /// No block can have as many updates as the pages of the MT.
+    #[error("a block cannot hold 2^{bits} updates; put the MT into pages of 2^4 to 2^16")]
     Blocks {
-        /// log2 of the updates asked for.
+        /// log2 of the updates of a page.
         bits: u32,
     },
     /// An update of the MT cannot be applied.
@@ -104,7 +87,7 @@ pub enum EncodeError {
     Write(#[source] io::Error),
 }
 
-/// The bytes of an MT file.
+/// The bytes of an MT file. Its blocks, the least that a client can fetch by itself, are the pages of the MT: see [`Mt::in_pages`].
 ///
 /// # Errors
 /// If the MT is not complete, or could not be read back.
@@ -119,10 +102,9 @@ pub fn encode(mt: &Mt, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> 
 /// # Errors
 /// As [`encode`], and when `writer` fails.
 pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -> Result<u64, EncodeError> {
-    check(mt, options)?;
-    let BlockScan { blocks, in_blocks, reference, histograms } = BlockScan::of(mt, options)?;
-    let mt = in_blocks.as_ref().unwrap_or(mt);
-    let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
+    check(mt)?;
+    let BlockScan { blocks, reference, histograms } = BlockScan::of(mt, options)?;
+    let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks };
     index.round(mt.info());
     let exact = corrections(mt, &options.exact, &reference)?;
     let sections = sections(mt, &options.metadata, &mut index, histograms.as_ref(), &exact)?;
@@ -138,7 +120,11 @@ pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -
     payload::write_end(&mut end, totals);
     let end = Section::new(Kind::ENDF, end)?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
-    put(&header(total, version_for(mt.info().kind, options.histograms), mt.has_tet_errors()))?;
+    put(&header(
+        total,
+        version_for(mt.info().kind, options.histograms, mt.info().bounds.is_some()),
+        mt.has_tet_errors(),
+    ))?;
     for section in sections.iter().chain([&end]) {
         put(&section.head.to_bytes())?;
         put(&section.payload)?;
@@ -148,9 +134,9 @@ pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -
 }
 
 /// What a decoder would refuse must not be written.
-fn check(mt: &Mt, options: &EncodeOptions) -> Result<(), EncodeError> {
-    if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&options.block_bits) {
-        return Err(EncodeError::Blocks { bits: options.block_bits });
+fn check(mt: &Mt) -> Result<(), EncodeError> {
+    if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&mt.page_bits()) {
+        return Err(EncodeError::Blocks { bits: mt.page_bits() });
     }
     let info = mt.info();
     if mt.present() != info.updates {
@@ -206,7 +192,7 @@ fn sections(
     exact: &[(u32, Corrections)],
 ) -> Result<Vec<Section>, EncodeError> {
     let fields = mt.info().fields.len();
-    let mut counts = count_all(mt, index.block_bits)?;
+    let mut counts = count_all(mt)?;
     exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
     let models = Models::new(&counts);
     let mut shared = Vec::new();
@@ -214,6 +200,11 @@ fn sections(
         let mut payload = Vec::new();
         histograms.write(&mut payload);
         shared.push(Section::new(Kind::HIST, payload)?);
+    }
+    if let Some(bounds) = mt.info().bounds {
+        let mut payload = Vec::new();
+        payload::bounds::write(&mut payload, bounds);
+        shared.push(Section::new(Kind::BOUNDS, payload)?);
     }
     let mut payload = Vec::new();
     models.write(&mut payload);
@@ -281,12 +272,12 @@ fn put_base(out: &mut impl Put, mt: &Mt) {
 }
 
 /// Puts all that is coded of a file.
-fn put_all(out: &mut impl Put, mt: &Mt, block_bits: u32) -> Result<(), EncodeError> {
+fn put_all(out: &mut impl Put, mt: &Mt) -> Result<(), EncodeError> {
     put_base(out, mt);
     let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
     let mut first = 0;
     while first < mt.updates() {
-        let end = mt.updates().min(first + (1 << block_bits));
+        let end = mt.updates().min(first + (1 << mt.page_bits()));
         if mt.info().kind.is_paged() {
             put_page(out, mt, &(first..end));
         } else {
@@ -307,10 +298,11 @@ fn put_page(out: &mut impl Put, mt: &Mt, updates: &Range<u32>) {
 const COUNTED: usize = 16;
 
 /// How often each symbol occurs in what [`put_all`] puts.
-fn count_all(mt: &Mt, block_bits: u32) -> Result<Counts, EncodeError> {
+fn count_all(mt: &Mt) -> Result<Counts, EncodeError> {
+    let block_bits = mt.page_bits();
     let mut all = Counts::default();
     if !mt.info().kind.is_paged() {
-        put_all(&mut all, mt, block_bits)?;
+        put_all(&mut all, mt)?;
         return Ok(all);
     }
     put_base(&mut all, mt);
@@ -332,12 +324,12 @@ fn count_all(mt: &Mt, block_bits: u32) -> Result<Counts, EncodeError> {
 ///
 /// # Errors
 /// If the MT is damaged.
-pub fn breakdown(mt: &Mt, block_bits: u32) -> Result<Vec<(&'static str, f64)>, EncodeError> {
+pub fn breakdown(mt: &Mt) -> Result<Vec<(&'static str, f64)>, EncodeError> {
     let mut counts = Counts::default();
-    put_all(&mut counts, mt, block_bits)?;
+    put_all(&mut counts, mt)?;
     let models = Models::new(&counts);
     let mut measure = Measure::new(&models);
-    put_all(&mut measure, mt, block_bits)?;
+    put_all(&mut measure, mt)?;
     let mut parts: Vec<(&'static str, f64)> = Vec::new();
     for (name, family) in payload::parts(mt.info().kind) {
         let bytes = measure.bits_of(family) / 8.0;

@@ -8,9 +8,9 @@ pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
 /// Where in the file the version stands.
 pub const VERSION_AT: u64 = 8;
 /// Major and minor version of the newest files that this module writes.
-pub const VERSION: [u16; 2] = [3, 1];
+pub const VERSION: [u16; 2] = [3, 2];
 /// What files without half-edge MTs are written as: version 3 has these besides.
-const VERSION_WITHOUT_HALF_EDGE: [u16; 2] = [2, 1];
+const VERSION_WITHOUT_HALF_EDGE: [u16; 2] = [2, 2];
 /// The oldest major version that is read.
 const OLDEST: u16 = VERSION_WITHOUT_HALF_EDGE[0];
 /// Bytes of the file header.
@@ -35,10 +35,11 @@ pub struct Start {
     pub tet_errors: bool,
 }
 
-/// The lowest version of files that hold an MT of this kind, and histograms (which minor version 1 adds) or none.
-pub fn version_for(kind: MtKind, has_histograms: bool) -> [u16; 2] {
+/// The lowest version of files that hold an MT of this kind, histograms (which minor version 1 adds), and the box around the reference
+/// mesh (which minor version 2 adds).
+pub fn version_for(kind: MtKind, has_histograms: bool, has_bounds: bool) -> [u16; 2] {
     let [major, minor] = if kind == MtKind::HalfEdge { VERSION } else { VERSION_WITHOUT_HALF_EDGE };
-    [major, if has_histograms { minor } else { 0 }]
+    [major, if has_bounds { minor } else { u16::from(has_histograms) }]
 }
 
 /// The header of a file of a version that is `total` bytes long.
@@ -98,6 +99,8 @@ impl Kind {
     pub const INDX: Self = Self(*b"INDX");
     /// Histograms of the fields: those who do not know it do without.
     pub const HIST: Self = Self(*b"hist");
+    /// The box around the reference mesh: those who do not know it take a larger one.
+    pub const BOUNDS: Self = Self(*b"bbox");
     pub const MODL: Self = Self(*b"MODL");
     pub const BASE: Self = Self(*b"BASE");
     pub const FLDB: Self = Self(*b"FLDB");
@@ -112,7 +115,7 @@ impl Kind {
 
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
-        let head = [Self::INFO, Self::INDX, Self::HIST, Self::MODL, Self::BASE, Self::FLDB];
+        let head = [Self::INFO, Self::INDX, Self::HIST, Self::BOUNDS, Self::MODL, Self::BASE, Self::FLDB];
         let blocks = [Self::UPDT, Self::HALF, Self::FLDU, Self::INSV, Self::EXPL, Self::EXACT, Self::ENDF];
         head.contains(&self) || blocks.contains(&self)
     }

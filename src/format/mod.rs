@@ -17,8 +17,8 @@ mod payload;
 mod read;
 mod write;
 
-pub use decode::{DecodeOptions, Decoder, ErrorBytes, Progress};
-pub use encode::{BLOCK_BITS, EncodeError, EncodeOptions, breakdown, encode, encode_to};
+pub use decode::{DecodeOptions, Decoder, ErrorBytes, ExactStatus, Progress};
+pub use encode::{EncodeError, EncodeOptions, breakdown, encode, encode_to};
 pub use error::FormatError;
 pub use limits::Limits;
 pub use payload::exact::Corrections;

@@ -9,6 +9,13 @@ pub struct Bounds {
     pub max: [f64; 3],
 }
 
+/// The box around points of a lattice, its least and its largest corner; none if there are no points.
+pub fn lattice_box(points: impl IntoIterator<Item = [i32; 3]>) -> Option<[[i32; 3]; 2]> {
+    points.into_iter().map(|p| [p, p]).reduce(|[low, high], [p, _]| {
+        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+    })
+}
+
 impl Bounds {
     /// The box that contains nothing; the start of a union.
     pub const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };

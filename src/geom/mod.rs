@@ -18,7 +18,7 @@ mod triangle_grid;
 #[cfg(feature = "build")]
 mod weights;
 
-pub use bounds::Bounds;
+pub use bounds::{Bounds, lattice_box};
 pub use camera::{Camera, CameraError, CameraState, Projection, Ray, Rays, ViewPreset};
 #[cfg(feature = "build")]
 pub use dihedral::sharpness;

@@ -44,8 +44,12 @@ const HDF5: Known =
     ("a file in HDF5 or netCDF, which this build of tetralod leaves out,", "use one with the feature hdf5");
 
 /// What files begin with, behind white space and before whatever follows.
-const BEGINNINGS: [(&[u8], Known); 58] = [
+const BEGINNINGS: [(&[u8], Known); 59] = [
     (b"MFEM ", MFEM),
+    (
+        b"version https://git-lfs",
+        ("a pointer of Git LFS, which stands for a file,", "fetch that with `git lfs pull`"),
+    ),
     (b"\x89PNG", ("a PNG picture", PICTURE)),
     (b"II*\0", ("a TIFF picture", PICTURE)),
     (b"MM\0*", ("a TIFF picture", PICTURE)),
@@ -291,6 +295,7 @@ mod tests {
         let of = |name: &str, bytes: &[u8]| refused(name, bytes).to_string();
         for (content, word) in [
             ("MFEM mesh v1.0\n", "MFEM"),
+            ("version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"),
             ("FoamFile\n{\n", "OpenFOAM"),
             ("/*---*\\\n| OpenFOAM |\n*/\nFoamFile { version 2.0; }", "OpenFOAM"),
             ("EnSight Model Geometry File\n", "EnSight"),

@@ -18,7 +18,6 @@ mod repair;
 mod series;
 mod tet_mesh;
 
-#[cfg(feature = "build")]
 pub(crate) use adjacency::{FaceTable, boundary_faces, match_faces};
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
 pub(crate) use bit_set::BitSet;

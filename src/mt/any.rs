@@ -1,6 +1,8 @@
 //! An MT of any kind: what files hold and sessions use, without the caller knowing which.
 
-use super::{EdgeMt, ExplicitMt, HalfEdgeMt, MultiTessellation, UpdateError, VertexMt};
+use super::replay::replay;
+use super::stats::bounds;
+use super::{EdgeMt, ExplicitMt, HalfEdgeMt, MultiTessellation, ReplayError, UpdateError, VertexMt};
 use enum_dispatch::enum_dispatch;
 
 /// An MT of any kind.
@@ -24,7 +26,24 @@ impl Mt {
         self.info().kind.is_paged()
     }
 
-    /// The same MT, complete, with `2^bits` updates in each page. Kinds without pages stay as they are.
+    /// Finds the box around the reference mesh ([`MtInfo::bounds`]) if it is not known, by applying all updates once.
+    ///
+    /// # Errors
+    /// If one cannot be applied.
+    pub fn find_bounds(&mut self) -> Result<(), ReplayError> {
+        if self.info().bounds.is_none() {
+            let bounds = Some(bounds(&replay(self, |_| {})?));
+            match self {
+                Self::Edge(mt) => mt.info.bounds = bounds,
+                Self::Vertex(mt) => mt.info.bounds = bounds,
+                Self::HalfEdge(mt) => mt.info.bounds = bounds,
+                Self::Explicit(mt) => mt.info.bounds = bounds,
+            }
+        }
+        Ok(())
+    }
+
+    /// The same MT, complete, with `2^bits` updates in each page: the blocks of its file. Kinds without pages only note it for that.
     ///
     /// # Errors
     /// If an update is not here.
@@ -32,7 +51,16 @@ impl Mt {
         Ok(match self {
             Self::Edge(mt) => mt.in_pages(bits)?.into(),
             Self::HalfEdge(mt) => mt.in_pages(bits)?.into(),
-            mt => mt.clone(),
+            Self::Vertex(mt) => {
+                let mut mt = mt.clone();
+                mt.set_page_bits(bits);
+                mt.into()
+            }
+            Self::Explicit(mt) => {
+                let mut mt = mt.clone();
+                mt.set_page_bits(bits);
+                mt.into()
+            }
         })
     }
 }

@@ -53,7 +53,7 @@ impl From<ReplayError> for ConvertError {
 }
 
 impl Mt {
-    /// The same updates as an MT of another kind.
+    /// The same updates as an MT of another kind, in as many blocks as that kind usually has: see [`Mt::in_pages`].
     ///
     /// # Errors
     /// If that kind cannot hold them.
@@ -64,7 +64,7 @@ impl Mt {
             (_, MtKind::Explicit) => Ok(Self::Explicit(ExplicitMt::of(self)?)),
             (Self::Explicit(mt), MtKind::Vertex) => Ok(Self::Vertex(VertexMt::from_explicit(mt)?)),
             (Self::Explicit(mt), MtKind::HalfEdge) => {
-                Ok(Self::HalfEdge(HalfEdgeMt::from_explicit(mt, super::PAGE_BITS)?))
+                Ok(Self::HalfEdge(HalfEdgeMt::from_explicit(mt, to.usual_block_bits())?))
             }
             (Self::Explicit(mt), MtKind::Edge) => Ok(Self::Edge(EdgeMt::from_explicit(mt)?)),
             _ => Err(ConvertError::Kinds { from, to }),

@@ -53,7 +53,7 @@ pub use vertex::store::{NodeBits, VertexMt};
 pub(crate) use vertex::streaming::Insertion;
 pub use vertex::tet_errors::MAX_QUARTERINGS;
 
-use crate::geom::{Lattice, SinglePoints, SingleValues};
+use crate::geom::{Bounds, Lattice, SinglePoints, SingleValues};
 use crate::mesh::{Field, VectorPart};
 use enum_dispatch::enum_dispatch;
 use std::ops::Range;
@@ -182,9 +182,6 @@ impl FieldInfo {
     }
 }
 
-/// log2 of the updates of a page, unless somebody says otherwise.
-pub const PAGE_BITS: u32 = 10;
-
 /// What is known of an MT before its updates arrive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MtInfo {
@@ -208,12 +205,21 @@ pub struct MtInfo {
     /// The largest distance between a reference vertex on the lattice and in the input, in model units, rounded up; 0 if
     /// all are exact.
     pub quantization: f64,
+    /// The box around the reference mesh on the lattice, its least and its largest corner: all meshes of the MT are in it, and it is
+    /// as small as can be. None if that is not known, as of files of the first minor versions: see
+    /// [`find_bounds`](crate::mt::Mt::find_bounds).
+    pub bounds: Option<[[i32; 3]; 2]>,
 }
 
 impl MtInfo {
     /// How points are stored in single precision, in all meshes.
     pub fn single_points(&self) -> SinglePoints {
         SinglePoints::of(&self.lattice)
+    }
+
+    /// [`MtInfo::bounds`] in model units.
+    pub fn model_bounds(&self) -> Option<Bounds> {
+        self.bounds.map(|[min, max]| Bounds { min: self.lattice.point(min), max: self.lattice.point(max) })
     }
 
     /// The error of field `field` that is left when every update is applied, as a fraction of its range: what the
@@ -249,7 +255,8 @@ impl MtInfo {
     }
 
     /// How far the boundary of a mesh within `error` is from that of the input at most, in model units, compared at the vertices of
-    /// both.
+    /// both, and at the middles of the mesh's boundary triangles and of their edges. Elsewhere on curved boundaries it may be a little more:
+    /// `docs/promises.md` has numbers.
     pub fn boundary_bound(&self, error: f64) -> f64 {
         error * self.displacement_per_error + self.quantization
     }
@@ -351,10 +358,8 @@ pub trait UpdatePages: MultiTessellation {
         self.updates()
     }
 
-    /// log2 of the updates of a page.
-    fn page_bits(&self) -> u32 {
-        PAGE_BITS
-    }
+    /// log2 of the updates of a page, which is a block in a file. Kinds without pages only know it for their files.
+    fn page_bits(&self) -> u32;
 
     /// The updates of page `page`, which come and go together; none if there is no such page.
     fn page_updates(&self, page: u32) -> Range<u32> {

@@ -1,6 +1,7 @@
 //! What an MT is like and what it costs to store, in the paper's terms [§6, Table 1].
 
 use super::{ApplyUpdates, CurrentMesh};
+use crate::geom::lattice_box;
 use crate::mt::explicit::store::Counts;
 use crate::mt::replay::{ReplayError, replay};
 
@@ -118,11 +119,7 @@ pub fn stats(mt: &impl ApplyUpdates) -> Result<MtStats, ReplayError> {
 }
 
 /// The box around a mesh; around nothing, a point.
-fn bounds(mesh: &CurrentMesh) -> [[i32; 3]; 2] {
+pub(super) fn bounds(mesh: &CurrentMesh) -> [[i32; 3]; 2] {
     let used = (0..mesh.tet_slots() as u32).filter_map(|t| mesh.tet(t)).flatten();
-    let corners = used.map(|slot| mesh.positions()[slot as usize]);
-    let both = corners.map(|p| [p, p]).reduce(|[low, high], [p, _]| {
-        [[0, 1, 2].map(|i| low[i].min(p[i])), [0, 1, 2].map(|i| high[i].max(p[i]))]
-    });
-    both.unwrap_or_default()
+    lattice_box(used.map(|slot| mesh.positions()[slot as usize])).unwrap_or_default()
 }

@@ -73,7 +73,7 @@ pub struct Scene {
     state: SceneState,
     objects: Objects,
     kept: Option<Kept>,
-    /// The box around the base mesh, once it is there.
+    /// The box around the reference mesh, once it is known.
     bounds: Option<Bounds>,
     look: Look,
     /// Whether the state has changed since the last update.
@@ -158,7 +158,7 @@ impl Scene {
         Ok(())
     }
 
-    /// The box around the base mesh; none until that is there.
+    /// The box around the reference mesh, which all meshes are in; none until the base mesh is there.
     pub fn bounds(&self) -> Option<&Bounds> {
         self.bounds.as_ref()
     }
@@ -178,7 +178,7 @@ impl Scene {
         if self.bounds.is_some() || session.info().is_none() {
             return false;
         }
-        self.bounds = Some(session.view().bounds());
+        self.bounds = session.bounds();
         self.is_stale = true;
         true
     }

@@ -305,7 +305,12 @@ impl Session {
             Some(front) if is_in_use(front, index, mt, block) => BlockState::InUse,
             _ => BlockState::Here,
         };
-        let bounds = |[min, max]: [[i32; 3]; 2]| Bounds { min: lattice.point(min), max: lattice.point(max) };
+        // The index rounds them outwards.
+        let [low, high] = mt.info().bounds.unwrap_or([[0; 3], [i32::MAX; 3]]);
+        let bounds = |[min, max]: [[i32; 3]; 2]| Bounds {
+            min: lattice.point([0, 1, 2].map(|k| min[k].clamp(low[k], high[k]))),
+            max: lattice.point([0, 1, 2].map(|k| max[k].clamp(low[k], high[k]))),
+        };
         let blocks = (0..).zip(&index.blocks);
         blocks.map(|(block, info)| MappedBlock { bounds: bounds(info.bounds), state: state(block) }).collect()
     }

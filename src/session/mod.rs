@@ -17,7 +17,8 @@ pub use blocks::{BlockProgress, BlockState, MappedBlock, WantedBytes};
 pub use quantity::TetQuantity;
 pub use reading::Reading;
 
-use crate::format::{DecodeOptions, Decoder, FormatError, Limits};
+use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError, Limits};
+use crate::geom::Bounds;
 use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTessellation};
 use crate::refine::{
     Criterion, Front, LodCriterion, Need, Outcome, Part, RefineStats, Request, RequestError,
@@ -46,6 +47,11 @@ pub enum SessionError {
     /// The isovalue is not a finite number.
     #[error("the isovalue must be a finite number")]
     Isovalue,
+    /// The file keeps exact values, and they are not here.
+    #[error(
+        "the file keeps exact values behind its blocks, and they are not here: it is cut off, or has not arrived to its end"
+    )]
+    ExactMissing,
     /// The MT turned out to be damaged when an update was applied.
     #[error(transparent)]
     Format(#[from] FormatError),
@@ -141,6 +147,12 @@ impl Session {
     /// What is known of the MT; none until the base mesh is there.
     pub fn info(&self) -> Option<&MtInfo> {
         self.mt().map(Mt::info)
+    }
+
+    /// The box around the reference mesh in model units, which all meshes are in; none until the base mesh is there. See
+    /// [`Decoder::bounds`].
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.decoder.bounds()
     }
 
     /// The MT as far as it has arrived; none until the base mesh is there.
@@ -348,7 +360,8 @@ impl Session {
 
     /// One of the fields at the vertices of the current mesh in double precision: exact at vertices of the reference mesh if
     /// the file keeps exact values, else the values of the levels; empty if there is no such field. Exact values come last in
-    /// a file: a session in parts has them after [`Session::take_exact`].
+    /// a file: a session in parts has them after [`Session::take_exact`], and a file that is cut off has lost them. Which of these
+    /// it is tells [`Decoder::exact_status`].
     pub fn exact_values(&self, field: usize) -> Vec<f64> {
         let (Some(mesh), Some(info)) = (self.mesh(), self.info().and_then(|info| info.fields.get(field)))
         else {
@@ -365,9 +378,8 @@ impl Session {
 
     /// The bytes of the file that hold its exact values, for [`Session::take_exact`]; none if there are none, or they are here.
     pub fn exact_range(&self) -> Option<Range<u64>> {
-        let fields = self.info()?.fields.len();
-        let here = (0..fields).any(|field| self.decoder.exact(field).is_some());
-        self.decoder.exact_range().filter(|_| !here && self.decoder.takes_blocks())
+        let is_missing = self.decoder.exact_status() == ExactStatus::Missing;
+        self.decoder.exact_range().filter(|_| is_missing && self.decoder.takes_blocks())
     }
 
     /// Takes in the bytes of [`Session::exact_range`], in sessions in parts.
@@ -382,9 +394,12 @@ impl Session {
     /// Changes the current mesh to the reference mesh if there are any.
     ///
     /// # Errors
-    /// As [`Session::refine`].
+    /// As [`Session::refine`]; [`SessionError::ExactMissing`] if the file keeps exact values that are not here.
     pub fn exact_tables(&mut self) -> Result<Vec<Exact>, SessionError> {
         let count = self.info().ok_or(SessionError::NotReady)?.fields.len();
+        if self.decoder.exact_status() == ExactStatus::Missing {
+            return Err(SessionError::ExactMissing);
+        }
         let fields: Vec<usize> = (0..count).filter(|&f| self.decoder.exact(f).is_some()).collect();
         if !fields.is_empty() {
             self.refine(&Request::within(0.0))?;

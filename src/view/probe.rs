@@ -4,17 +4,22 @@
 //! that is not convex need not mean that the point is outside, all tetrahedra are searched or, when that happens more
 //! often, a grid of boxes over the mesh. All decisions are exact (Shewchuk 1997) for the coordinates given.
 //!
-//! What holds: a point of the domain, its boundary included, is found, and one outside is not; of several tetrahedra
-//! that meet at a point the one with the smallest number is taken.
+//! What holds: a point of the domain, its boundary included, is found; of several tetrahedra that meet at a point the one with the smallest
+//! number is taken. Points that are computed to be on a face of the boundary are beside it by what rounding does: one that is outside by no more
+//! than [`ROUNDING`] is found in the nearest tetrahedron, at its border. What is further outside is not found.
 
-use crate::geom::{Groups, sort_few, total_order};
+use crate::geom::{Bounds, Groups, sort_few, total_order};
 use crate::mesh::{FACES, NONE};
 use crate::view::MeshView;
+use glam::DVec3;
 use robust::Coord3D;
 
 /// Pieces of a line that are shorter than this fraction of it are left out, and gaps are closed: rounding makes them
 /// where a line passes through points and edges of the mesh.
 const SHORTEST: f64 = 1e-12;
+
+/// How far outside a point may be to be found all the same, as a fraction of the largest coordinate of the mesh and the point.
+const ROUNDING: f64 = 1e-13;
 
 /// The most steps of a walk: it ends in most meshes, but can run in a circle in some.
 const MOST_STEPS: u32 = 10_000;
@@ -99,7 +104,7 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// The place of a point; none outside. Points near to the one before are found soonest.
+    /// The place of a point; none outside, but for what rounding does. Points near to the one before are found soonest.
     ///
     /// # Panics
     /// If the mesh names a point or a neighbour that it does not have.
@@ -107,7 +112,7 @@ impl<'a> Probe<'a> {
         if !p.iter().all(|x| x.is_finite()) || self.mesh.tets.is_empty() {
             return None;
         }
-        let tet = self.find(p)?;
+        let tet = self.find(p).or_else(|| self.find_beside(p))?;
         self.last = tet;
         let sides = self.sides(tet, p)?;
         Some(Place { tet, weights: weights(sides) })
@@ -141,6 +146,49 @@ impl<'a> Probe<'a> {
         let near = NearLine::new(&self.mesh, p, p);
         let mut candidates = (0..self.mesh.tets.len() as u32).filter(|&t| near.meets(&self.mesh, t));
         candidates.find(|&t| self.holds(t, p)).map(|tet| self.smallest(tet, p))
+    }
+
+    /// The nearest tetrahedron to a point that is outside by what rounding does; of several the one with the smallest number.
+    fn find_beside(&self, p: [f64; 3]) -> Option<u32> {
+        let largest =
+            |bounds: &Bounds| bounds.min.into_iter().chain(bounds.max).fold(0.0, |m: f64, x| m.max(x.abs()));
+        let bounds = self
+            .grid
+            .as_ref()
+            .map_or_else(|| self.mesh.bounds(), |grid| Bounds { min: grid.min, max: grid.max });
+        let reach = ROUNDING * largest(&bounds.with(p));
+        let [low, high] = [-reach, reach].map(|reach| p.map(|x| x + reach));
+        if !(0..3).all(|i| bounds.min[i] <= high[i] && low[i] <= bounds.max[i]) {
+            return None;
+        }
+        let mut best: Option<(f64, u32)> = None;
+        let mut see = |t: u32| {
+            let beside = self.beside(t, p, [low, high]).filter(|beside| *beside <= reach);
+            if let Some(beside) = beside.filter(|beside| best.is_none_or(|(least, _)| *beside < least)) {
+                best = Some((beside, t));
+            }
+        };
+        match &self.grid {
+            Some(grid) => grid.within(low, high).into_iter().for_each(&mut see),
+            None => (0..self.mesh.tets.len() as u32).for_each(&mut see),
+        }
+        best.map(|(_, t)| t)
+    }
+
+    /// How far a point is beyond the faces of a tetrahedron, of those whose box meets another one.
+    fn beside(&self, t: u32, p: [f64; 3], [low, high]: [[f64; 3]; 2]) -> Option<f64> {
+        let corners = self.proper(t)?.map(|v| self.mesh.positions[v as usize]);
+        let meets =
+            |i: usize| corners.iter().any(|c| c[i] <= high[i]) && corners.iter().any(|c| c[i] >= low[i]);
+        if !(meets(0) && meets(1) && meets(2)) {
+            return None;
+        }
+        let beyond = |face: [usize; 3]| {
+            let [a, b, c] = face.map(|k| DVec3::from(corners[k]));
+            let area = (b - a).cross(c - a).length();
+            orient(a.into(), b.into(), c.into(), p) / area
+        };
+        Some(FACES.map(beyond).into_iter().fold(0.0, f64::max))
     }
 
     fn first_of(&self, candidates: &[u32], p: [f64; 3]) -> Option<u32> {
@@ -479,6 +527,16 @@ impl Grid {
         }
         let [i, j, k] = [0, 1, 2].map(|axis| self.place(p[axis], axis));
         self.tets.of((k * self.dims[1] + j) * self.dims[0] + i)
+    }
+
+    /// The tetrahedra that may be in a box, in ascending order.
+    fn within(&self, low: [f64; 3], high: [f64; 3]) -> Vec<u32> {
+        let mut found = Vec::new();
+        let range = [0, 1, 2].map(|i| [self.place(low[i], i), self.place(high[i], i)]);
+        self.each_box(range, |b| found.extend_from_slice(self.tets.of(b)));
+        found.sort_unstable();
+        found.dedup();
+        found
     }
 
     /// The tetrahedra that a segment may meet, in ascending order.

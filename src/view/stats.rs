@@ -9,6 +9,8 @@ pub struct FieldStats {
     volume: Sum,
     /// The first value. Sums are of differences from it: squares of values in a narrow range far from 0 have no digits for that.
     base: f64,
+    /// Squares are of differences in this unit, so that those of very large or small ones keep their place.
+    unit: f64,
     integral: Sum,
     squares: Sum,
     min: f64,
@@ -20,6 +22,7 @@ impl Default for FieldStats {
         Self {
             volume: Sum::default(),
             base: f64::NAN,
+            unit: 0.0,
             integral: Sum::default(),
             squares: Sum::default(),
             min: f64::INFINITY,
@@ -47,10 +50,15 @@ impl FieldStats {
         }
         let differences = values.map(|value| value - self.base);
         let sum: f64 = differences.iter().sum();
-        let squares: f64 = differences.iter().map(|v| v * v).sum();
+        if self.unit == 0.0 {
+            self.unit = unit_of(differences);
+        }
+        let unit = if self.unit == 0.0 { 1.0 } else { self.unit };
+        let parts = differences.map(|v| v / unit);
+        let (part_sum, squares): (f64, f64) = (parts.iter().sum(), parts.iter().map(|v| v * v).sum());
         self.volume.add(volume);
         self.integral.add(volume * 0.25 * sum);
-        self.squares.add(volume * (sum * sum + squares) / 20.0);
+        self.squares.add(volume * (part_sum * part_sum + squares) / 20.0);
         self.min = values.into_iter().fold(self.min, f64::min);
         self.max = values.into_iter().fold(self.max, f64::max);
     }
@@ -73,7 +81,8 @@ impl FieldStats {
     /// The standard deviation of the field from its mean over the volume.
     pub fn deviation(&self) -> f64 {
         if self.volume() > 0.0 {
-            (self.squares.total() / self.volume() - self.mean_difference().powi(2)).max(0.0).sqrt()
+            let mean = if self.unit == 0.0 { 0.0 } else { self.mean_difference() / self.unit };
+            (self.squares.total() / self.volume() - mean * mean).max(0.0).sqrt() * self.unit
         } else {
             0.0
         }
@@ -87,6 +96,16 @@ impl FieldStats {
     /// The smallest and the largest value; infinite where there is nothing.
     pub fn range(&self) -> [f64; 2] {
         [self.min, self.max]
+    }
+}
+
+/// 1 for differences of usual size; the largest of others, 0 while there is none.
+fn unit_of(differences: [f64; 4]) -> f64 {
+    let largest = differences.into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if largest == 0.0 || (1e-100..1e100).contains(&largest) || !largest.is_finite() {
+        largest.min(1.0).ceil()
+    } else {
+        largest
     }
 }
 

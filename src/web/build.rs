@@ -222,13 +222,7 @@ impl MeshBuilder {
         stages.begin("encode")?;
         let built_by = config.construction.metadata().into_iter().chain(level.metadata());
         let metadata = built_by.chain(metadata).collect();
-        let encoding = EncodeOptions {
-            block_bits: config.block_bits,
-            check_margins: true,
-            exact: built.exact,
-            histograms: true,
-            metadata,
-        };
+        let encoding = EncodeOptions { check_margins: true, exact: built.exact, histograms: true, metadata };
         let bytes = encode(&built.mt, &encoding)?;
         let (repaired, repair) =
             repaired.map_or_else(Default::default, |(done, repair)| (done.to_string(), Some(repair)));

@@ -98,7 +98,7 @@ fn format_code(error: &FormatError) -> &'static str {
 
 fn session_code(error: &SessionError) -> &'static str {
     match error {
-        SessionError::NotReady => "not-ready",
+        SessionError::NotReady | SessionError::ExactMissing => "not-ready",
         SessionError::Request(_) | SessionError::Isovalue => "bad-option",
         SessionError::Format(error) => format_code(error),
     }

@@ -91,13 +91,21 @@ export interface MtInfo {
   /** The kind of Multi-Tessellation: what its updates are. */
   kind: "half-edge" | "edge" | "vertex" | "explicit";
   fields: FieldInfo[];
-  /** A box that holds every mesh of the volume, and may be larger: `[x0, y0, z0, x1, y1, z1]` in model units. */
+  /**
+   * The box around the reference mesh, which holds every mesh of the volume: `[x0, y0, z0, x1, y1, z1]` in model units. Of files that were
+   * made before they stated it, it may be larger by a 256th of the lattice at each side.
+   */
   bounds: number[];
   /** What positions in arrays of single precision are relative to. 0 unless the volume needs it; see {@link Stored}. */
   origin: [number, number, number];
   /** Size of the reference mesh, the finest one. */
   vertices: number;
   tetrahedra: number;
+  /**
+   * Whether the file keeps exact values behind all else (`--lossless`), and whether they have arrived. Files that come by blocks do not
+   * need them, and a file that is cut off has lost them.
+   */
+  exactValues: "none" | "missing" | "here";
   /** Updates between the base mesh and the reference mesh. */
   updates: number;
 }

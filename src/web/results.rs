@@ -3,6 +3,7 @@
 use super::arrays::{doubles, integers, list, object, record, set};
 use super::options::Asked;
 use super::stored::Stored;
+use crate::geom::Bounds;
 use crate::mt::{FieldInfo, MtInfo};
 use crate::refine::RefineStats;
 use crate::session::{BlockProgress, Progress, Session};
@@ -59,10 +60,8 @@ pub fn blocks(progress: &BlockProgress) -> JsBlocks {
 /// What is known of the MT of a session, for JavaScript.
 pub fn info(session: &Session) -> Option<JsInfo> {
     let info = session.info()?;
-    let [x0, y0, z0] = info.lattice.origin;
-    let [x1, y1, z1] = info.lattice.point([1 << info.lattice.bits; 3]);
+    let Bounds { min: [x0, y0, z0], max: [x1, y1, z1] } = session.bounds()?;
     let fields: Array = (0..info.fields.len()).map(|index| field(session, info, index)).collect();
-    // The box of the position lattice: it holds every mesh of the MT.
     Some(object(&[
         ("kind", info.kind.name().into()),
         ("fields", fields.into()),
@@ -71,6 +70,7 @@ pub fn info(session: &Session) -> Option<JsInfo> {
         ("vertices", info.vertices.into()),
         ("tetrahedra", info.tetrahedra.into()),
         ("updates", info.updates.into()),
+        ("exactValues", session.decoder().exact_status().name().into()),
     ]))
 }
 

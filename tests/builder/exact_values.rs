@@ -5,11 +5,11 @@ use std::io::Cursor;
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, BuildResult, build};
 use tetralod::client::{Client, ClientError, ClientOptions};
-use tetralod::format::{EncodeOptions, FormatError, encode};
+use tetralod::format::{EncodeOptions, ExactStatus, FormatError, encode};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{MtKind, VertexId};
 use tetralod::refine::Request;
-use tetralod::session::Session;
+use tetralod::session::{Session, SessionError};
 use tetralod::stream::FileSource;
 
 /// A file of an edge-based MT with exact values, in small blocks, and the MT's vertex for each point.
@@ -17,7 +17,7 @@ fn file(mesh: &TetMesh) -> (Vec<u8>, Vec<VertexId>) {
     let config = BuildConfig { all_lossless: true, block_bits: 4, ..BuildConfig::of(MtKind::Edge) };
     let built = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on");
     let BuildResult { mt, vertices, exact, .. } = built;
-    let options = EncodeOptions { block_bits: 4, exact, ..EncodeOptions::default() };
+    let options = EncodeOptions { exact, ..EncodeOptions::default() };
     (encode(&mt, &options).expect("a sound MT"), vertices)
 }
 
@@ -99,4 +99,60 @@ fn conversions_keep_exact_values() {
         read.refine(&Request::within(0.0)).expect("a sensible request");
         assert_eq!(exact(&read, &mesh, &vertices), [mesh.positions.len(); 2], "{}", kind.name());
     }
+}
+
+/// Feeds all but the last bytes.
+fn fed(bytes: &[u8], left_out: usize) -> Session {
+    let mut session = Session::new();
+    session.feed(&bytes[..bytes.len() - left_out]).expect("a sound prefix");
+    session
+}
+
+#[test]
+fn a_file_whose_exact_values_are_cut_off_says_so() {
+    let mut mesh = cube(6, &[hilly, |[x, y, z]| x * y / (1.5 + z)]);
+    mesh.fields[0].values[3] = 1.0 / 3.0;
+    let config =
+        BuildConfig { all_fields: true, all_lossless: true, block_bits: 4, ..BuildConfig::of(MtKind::Edge) };
+    let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on");
+    let options = EncodeOptions { exact: built.exact, ..EncodeOptions::default() };
+    let bytes = encode(&built.mt, &options).expect("a sound MT");
+    let whole = fed(&bytes, 0);
+    assert_eq!(
+        (whole.decoder().exact_status(), fed(&bytes, 1).decoder().exact_status()),
+        (ExactStatus::Here, ExactStatus::Missing)
+    );
+    let range = whole.decoder().exact_range().expect("there are exact values");
+    let first = range.start
+        + 12
+        + u64::from(u32::from_le_bytes(bytes[range.start as usize + 4..][..4].try_into().expect("four")));
+    assert!(first < range.end, "a section for each field");
+    // Where the blocks end, where the first of two sections ends, and within them.
+    for end in [range.start, range.start + 5, first, first + 20, range.end - 1] {
+        let cut = &bytes[..end as usize];
+        let mut session = fed(cut, 0);
+        assert!(matches!(session.finish(), Err(FormatError::Truncated { offset }) if offset == end));
+        assert_eq!(session.decoder().exact_status(), ExactStatus::Missing, "{end}");
+        session.refine(&Request::within(0.0)).expect("all blocks are here");
+        assert_eq!(session.mesh().map(|mesh| mesh.tet_count()), Some(mesh.tets.len()));
+        assert!(matches!(session.exact_tables(), Err(SessionError::ExactMissing)), "{end}");
+        // In parts.
+        let mut client = open(cut);
+        client.refine(&Request::within(0.0)).expect("all blocks are here");
+        assert_eq!(client.session().decoder().exact_status(), ExactStatus::Missing);
+        for _ in 0..2 {
+            let refused = client.fetch_exact();
+            assert!(
+                matches!(refused, Err(ClientError::Format(FormatError::Truncated { offset })) if offset == end),
+                "{end}: {refused:?}"
+            );
+        }
+        assert!(client.session().mesh().is_some_and(|found| found.tet_count() == mesh.tets.len()));
+    }
+    let mut client = open(&bytes);
+    client.fetch_exact().expect("a whole file");
+    assert_eq!(client.session().decoder().exact_status(), ExactStatus::Here);
+    let plain = encode(&built.mt, &EncodeOptions::default()).expect("a sound MT");
+    assert_eq!(fed(&plain, 0).decoder().exact_status(), ExactStatus::None);
+    assert_eq!(fed(&plain, 1).decoder().exact_status(), ExactStatus::None);
 }

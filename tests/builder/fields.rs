@@ -13,6 +13,7 @@ use tetralod::mt::{
 };
 use tetralod::refine::Request;
 use tetralod::session::Session;
+use tetralod::verify::{Reference, Sample};
 
 /// Every kind with every way to build it.
 const WAYS: [(MtKind, Method, BuildCriterion); 8] = [
@@ -283,4 +284,48 @@ fn fields_at_cells_are_refused_with_the_remedy_and_built_once_they_are_at_points
     assert!(0.0 <= mt.info().fields[0].min && mt.info().fields[0].max <= mesh.tets.len() as f64 - 1.0);
     let bare = TetMesh { fields: Vec::new(), cell_fields: vec![Field::new("rho", Vec::new())], ..mesh };
     assert!(matches!(try_build(&bare, &BuildConfig::of(MtKind::Edge)), Err(BuildError::CellField { .. })));
+}
+
+/// The limits on both sides, in coordinates and in values, for all ways to build.
+#[test]
+fn what_double_precision_cannot_compute_with_is_refused() {
+    let scaled = |position: f64, value: f64| {
+        let mut mesh = cube(3, &[hilly]);
+        mesh.grid = None;
+        mesh.positions.iter_mut().flatten().for_each(|x| *x *= position);
+        mesh.fields[0].values.iter_mut().for_each(|x| *x *= value);
+        mesh
+    };
+    for (kind, method, criterion) in WAYS {
+        let config = BuildConfig {
+            construction: Construction::new(kind, method, criterion).expect("they go together"),
+            ..BuildConfig::of(kind)
+        };
+        for size in [1e-45, 1e-30, 1e30, 1e50] {
+            for (position, value) in [(size, 1.0), (1.0, size), (size, size)] {
+                let mesh = scaled(position, value);
+                let mt = made(&mesh, &config).mt;
+                let report = tetralod::verify::run_sample(
+                    &mt,
+                    &mesh,
+                    if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points },
+                    Sample { requests: 3, ..Sample::default() },
+                    &mut |_, _| {},
+                );
+                assert!(report.valid, "{kind:?}, {position:e}, {value:e}: {:#?}", report.failures);
+            }
+        }
+        for size in [1e-320, 1e-200, 1e-56, 1e52, 1e200, 1e307] {
+            let refused = try_build(&scaled(size, 1.0), &config).map(|_| "built");
+            assert!(
+                matches!(refused, Err(BuildError::Scale { field: None, .. })),
+                "{kind:?}, {size:e}: {refused:?}"
+            );
+            let message = refused.expect_err("refused").to_string();
+            assert!(message.contains("the coordinates") && message.contains("scale them"), "{message}");
+            let refused = try_build(&scaled(1.0, size), &config).map(|_| "built");
+            let named = matches!(&refused, Err(BuildError::Scale { field: Some(name), .. }) if name == "f0");
+            assert!(named, "{kind:?}, {size:e}: {refused:?}");
+        }
+    }
 }

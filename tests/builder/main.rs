@@ -16,6 +16,7 @@ mod restrictions;
 #[path = "../support/mod.rs"]
 mod support;
 mod theory;
+mod touching;
 mod verify_real;
 mod verify_samples;
 mod verify_shown;

@@ -24,6 +24,7 @@ fn mesh() -> (MtInfo, CurrentMesh) {
         updates: 0,
         displacement_per_error: 1.0,
         quantization: 0.0,
+        bounds: None,
     };
     let base = BaseMesh {
         positions: vec![[8, 8, 8], [16, 8, 8], [8, 16, 8], [8, 8, 16], [8, 8, 0]],

@@ -9,7 +9,7 @@ use tetralod::builder::parts::{self, Node, Part, PartUpdates, PartsError, Plan};
 use tetralod::builder::{BuildConfig, BuildError, BuildProgress, BuildResult, OnProgress, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::{Field, Grid, TetMesh};
-use tetralod::mt::{Mt, MtKind, MultiTessellation};
+use tetralod::mt::{Mt, MtKind, MultiTessellation, UpdatePages};
 use tetralod::verify::{self, Reference};
 
 fn go_on(_: BuildProgress) -> ControlFlow<()> {
@@ -82,9 +82,7 @@ pub fn in_parts(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> BuildResult
 }
 
 pub fn bytes(built: &BuildResult) -> Vec<u8> {
-    let block_bits = BuildConfig::default().block_bits;
     let options = EncodeOptions {
-        block_bits,
         check_margins: true,
         exact: built.exact.clone(),
         histograms: true,
@@ -92,7 +90,7 @@ pub fn bytes(built: &BuildResult) -> Vec<u8> {
     };
     let bytes = encode(&built.mt, &options).expect("an MT that can be written");
     // In pages anew nothing is known of the blocks.
-    let scanned = built.mt.in_pages(block_bits).expect("a complete MT");
+    let scanned = built.mt.in_pages(built.mt.page_bits()).expect("a complete MT");
     assert!(encode(&scanned, &options).expect("an MT that can be written") == bytes, "other blocks");
     bytes
 }

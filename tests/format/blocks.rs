@@ -99,8 +99,7 @@ fn header_and_index_are_small() {
     let mesh = tetralod::generate::bucky(33).expect("a size that is allowed");
     let built = build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()))
         .expect("a good mesh");
-    let bytes =
-        encode(&built.mt, &EncodeOptions { block_bits: 11, ..EncodeOptions::default() }).expect("complete");
+    let bytes = encode(&built.mt, &EncodeOptions::default()).expect("complete");
     let sections = sections(&bytes);
     assert_eq!([sections[0].0, sections[1].0], [*b"INFO", *b"INDX"]);
     let head = 32 + 12 + sections[0].1.len() + 12 + sections[1].1.len();

@@ -165,10 +165,8 @@ fn outcome(bytes: &[u8]) -> String {
     if let Err(error) = fed {
         return name(&error);
     }
-    let block_bits = decoder.index().map_or(8, |index| index.block_bits);
-    let options = EncodeOptions { block_bits, ..EncodeOptions::default() };
     let mt = decoder.into_mt().expect("a complete file has a base mesh");
-    match encode(&mt, &options) {
+    match encode(&mt, &EncodeOptions::default()) {
         Ok(bytes) => {
             assert!(decode(&bytes).is_ok_and(|again| again == mt), "not what was written");
             "read".into()

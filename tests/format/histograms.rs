@@ -2,7 +2,9 @@
 //! histogram of the reference mesh is tested in `tests/session/curve.rs`.)
 
 use crate::reader;
-use crate::support::files::{assemble, bytes_of, decode, encoded, options, sample, samples, sections};
+use crate::support::files::{
+    assemble, bytes_of, decode, encoded, in_blocks, options, sample, samples, sections,
+};
 use tetralod::format::{Decoder, EncodeOptions, FormatError};
 
 fn decoder(bytes: &[u8]) -> Decoder {
@@ -30,7 +32,8 @@ fn both_readers_find_the_same() {
 #[test]
 fn without_them_the_file_is_one_of_the_version_before() {
     for mt in samples(1, 40) {
-        let bytes = encoded(&mt, &EncodeOptions { histograms: false, ..options() }).expect("a sound MT");
+        let bytes = encoded(&in_blocks(&mt, 8), &EncodeOptions { histograms: false, ..options() })
+            .expect("a sound MT");
         assert_eq!(bytes[10..12], [0, 0], "the minor version");
         assert_eq!(decoder(&bytes).histogram(0), None);
         let with = bytes_of(&mt);

@@ -1,6 +1,7 @@
 //! Promises of MT files: read back, split, cut off, damaged, and as the specification says.
 
 mod blocks;
+mod bounds;
 mod damaged;
 mod facts;
 mod golden;

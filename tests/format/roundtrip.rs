@@ -8,7 +8,7 @@ use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, build};
-use tetralod::format::{BLOCK_BITS, Decoder, EncodeError, EncodeOptions, encode_to};
+use tetralod::format::{Decoder, EncodeError, EncodeOptions, encode_to};
 use tetralod::generate;
 use tetralod::geom::WIDE_BITS;
 use tetralod::mt::{
@@ -102,6 +102,7 @@ fn what_could_not_be_read_back_is_not_written() {
     assert!(matches!(encoded(&miscounted, &plain), Err(EncodeError::Base(_))));
 
     let spelled = spelled(1, 5);
+    let spelled_in = |bits| Mt::from(spelled.clone()).in_pages(bits).expect("a complete MT");
     let other = MtInfo { updates: 0, ..spelled.info().clone() };
     let other = ExplicitMt::new(other, MultiTessellation::base(&spelled).clone());
     assert!(matches!(encoded(&other, &plain), Err(EncodeError::Base(_))));
@@ -110,11 +111,12 @@ fn what_could_not_be_read_back_is_not_written() {
     let wordy = EncodeOptions { metadata, ..plain.clone() };
     assert!(matches!(encoded(&whole, &wordy), Err(EncodeError::TooLong { .. })));
 
-    for block_bits in [0, 3, 17, 32, u32::MAX] {
-        let odd = EncodeOptions { block_bits, ..plain.clone() };
-        assert!(matches!(encoded(&whole, &odd), Err(EncodeError::Blocks { bits }) if bits == block_bits));
+    for page_bits in [0, 3, 17, 32, u32::MAX] {
+        let odd = spelled_in(page_bits);
+        assert!(matches!(encoded(&odd, &plain), Err(EncodeError::Blocks { bits }) if bits == page_bits));
     }
-    assert!((4..=16).contains(&BLOCK_BITS));
+    let small = whole.in_pages(3).expect("a complete MT");
+    assert!(matches!(encoded(&small, &plain), Err(EncodeError::Blocks { bits: 3 })));
 
     // Updates that no mesh takes: all goes to one side, and more than there is.
     let mut damaged = EdgeMt::new(whole.info().clone(), whole.base().clone());

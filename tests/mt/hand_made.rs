@@ -38,6 +38,7 @@ impl Cone {
             updates: 1,
             displacement_per_error: 1.0,
             quantization: 0.0,
+            bounds: None,
         }
     }
 

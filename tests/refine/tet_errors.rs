@@ -322,13 +322,13 @@ fn all_kinds_hold_the_same_and_files_keep_it() {
         assert!(explicit.convert(MtKind::Vertex).unwrap() == subject.vertex);
         assert!(subject.vertex.convert(MtKind::Explicit).unwrap() == explicit);
         for mt in [&subject.vertex, &explicit] {
-            let bytes = encode(mt, &EncodeOptions { block_bits: 7, ..EncodeOptions::default() }).unwrap();
+            let bytes = encode(&mt.in_pages(7).unwrap(), &EncodeOptions::default()).unwrap();
             let mut decoder = Decoder::default();
             for piece in bytes.chunks(777) {
                 decoder.feed(piece).unwrap();
             }
             decoder.finish().unwrap();
-            assert!(decoder.mt() == Some(mt));
+            assert!(decoder.mt() == Some(&mt.in_pages(7).unwrap()));
         }
     }
 }
@@ -339,7 +339,7 @@ fn what_has_arrived_gives_the_least_set_of_its_own() {
     let subject = &SUBJECTS[0];
     let explicit = Mt::from(subject.explicit.clone());
     for mt in [&subject.vertex, &explicit] {
-        let bytes = encode(mt, &EncodeOptions { block_bits: 6, ..EncodeOptions::default() }).unwrap();
+        let bytes = encode(&mt.in_pages(6).unwrap(), &EncodeOptions::default()).unwrap();
         let request = Request::within(0.01);
         let criterion = LodCriterion::new(mt.info(), &request);
         let mut decoder = Decoder::default();

@@ -27,7 +27,7 @@ fn file(kind: MtKind) -> Vec<u8> {
     let construction = Construction::default_for(kind);
     let config = BuildConfig { construction, block_bits: BLOCK_BITS, ..BuildConfig::of(MtKind::Edge) };
     let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
-    encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
+    encode(&mt, &EncodeOptions::default()).expect("a sound MT")
 }
 
 /// Counts the bytes that a file gives.

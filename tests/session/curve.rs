@@ -18,7 +18,7 @@ fn file(kind: MtKind) -> Vec<u8> {
     mesh.fields.push(Field::new("height", height));
     let config = BuildConfig { block_bits: BLOCK_BITS, all_fields: true, ..BuildConfig::of(kind) };
     let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
-    let options = EncodeOptions { block_bits: BLOCK_BITS, histograms: true, ..EncodeOptions::default() };
+    let options = EncodeOptions { histograms: true, ..EncodeOptions::default() };
     encode(&built.mt, &options).expect("a sound MT")
 }
 

@@ -24,7 +24,7 @@ fn file_of(kind: MtKind, size: u32) -> Vec<u8> {
     let mesh = generate::bucky(size).expect("a size that is allowed");
     let config = BuildConfig { block_bits: BLOCK_BITS, ..BuildConfig::of(kind) };
     let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
-    encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
+    encode(&mt, &EncodeOptions::default()).expect("a sound MT")
 }
 
 /// A server: counts the bytes it gives.

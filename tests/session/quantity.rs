@@ -21,7 +21,8 @@ fn file(kind: MtKind) -> Vec<u8> {
     let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
     let mt: Mt = built.expect("a valid mesh").mt;
     let mt = if kind == of { mt } else { mt.convert(kind).expect("any MT can be spelled out") };
-    encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
+    let mt = mt.in_pages(BLOCK_BITS).expect("a complete MT");
+    encode(&mt, &EncodeOptions::default()).expect("a sound MT")
 }
 
 fn opened(kind: MtKind) -> Session {

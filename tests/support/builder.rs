@@ -79,7 +79,7 @@ impl Stored {
             vertex: VertexId(self.vertex),
             offset_residual: self.offset_residual,
             edge: self.edge,
-            level_residuals: &self.level_residuals,
+            level_residuals: (&self.level_residuals[..]).into(),
             wrong_sides: self.wrong_sides,
             errors: &self.errors,
         }
@@ -364,5 +364,6 @@ fn info(reference: (usize, usize), fields: usize, updates: usize) -> MtInfo {
         updates: updates as u32,
         displacement_per_error: 1.0,
         quantization: 0.0,
+        bounds: None,
     }
 }

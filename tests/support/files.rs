@@ -94,6 +94,7 @@ pub fn small_info(kind: MtKind, bits: u32, fields: Vec<FieldInfo>, counts: [u32;
         updates,
         displacement_per_error: 2.0,
         quantization: 0.0,
+        bounds: None,
     }
 }
 
@@ -117,6 +118,7 @@ pub fn insertions(tets: u32, fields: usize, updates: usize) -> ExplicitMt {
         updates: n,
         displacement_per_error: 0.125,
         quantization: 0.0,
+        bounds: None,
     };
     let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|c: [i32; 3]| c.map(|x| x << 24));
     let base = BaseMesh {
@@ -173,11 +175,11 @@ pub fn samples(fields: usize, updates: usize) -> [Mt; 4] {
     ]
 }
 
-/// Small blocks, so that small MTs have many.
+/// What files say besides the MT.
 pub fn options() -> EncodeOptions {
     let pairs = [("tool", "a test"), ("ключ", "значение"), ("empty", "")];
     let metadata = pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).into();
-    EncodeOptions { block_bits: 8, histograms: true, metadata, ..EncodeOptions::default() }
+    EncodeOptions { histograms: true, metadata, ..EncodeOptions::default() }
 }
 
 /// [`encode`] for an MT of one kind, too.
@@ -185,13 +187,19 @@ pub fn encoded(mt: &(impl Clone + Into<Mt>), options: &EncodeOptions) -> Result<
     encode(&mt.clone().into(), options)
 }
 
+/// With small blocks, so that small MTs have many.
 pub fn bytes_of(mt: &(impl Clone + Into<Mt>)) -> Vec<u8> {
-    encoded(mt, &options()).expect("the MT is complete")
+    bytes_in_blocks(mt, 8)
 }
 
 /// The same with blocks of `2^block_bits` updates.
 pub fn bytes_in_blocks(mt: &(impl Clone + Into<Mt>), block_bits: u32) -> Vec<u8> {
-    encoded(mt, &EncodeOptions { block_bits, ..options() }).expect("the MT is complete")
+    encode(&in_blocks(mt, block_bits), &options()).expect("the MT is complete")
+}
+
+/// The MT with blocks of `2^block_bits` updates.
+pub fn in_blocks(mt: &(impl Clone + Into<Mt>), block_bits: u32) -> Mt {
+    mt.clone().into().in_pages(block_bits).expect("the MT is complete")
 }
 
 /// A decoder with limits.

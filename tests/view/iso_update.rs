@@ -265,7 +265,7 @@ fn normals_of_both_kinds_agree_with_the_gradient() {
     for (kind, least) in [(NormalKind::Gradient, 0.999), (NormalKind::Smooth, 0.99)] {
         let mut surface = IsoSurface::new();
         surface.set_normal_kind(kind);
-        surface.extract(&scene.view(), 0.12);
+        surface.extract(&scene.view(), 0.121);
         assert!(surface.positions.len() > 1000);
         for (p, n) in surface.positions.iter().zip(&surface.normals) {
             let inwards = p.map(|x| 0.5 - x);

@@ -11,6 +11,9 @@ mod cutaway;
 #[cfg(feature = "vulkan")]
 mod data_sets;
 mod difference;
+mod far;
+#[cfg(feature = "vulkan")]
+mod far_pictures;
 #[cfg(feature = "vulkan")]
 mod gpu_matches_cpu;
 mod integrals;

@@ -359,10 +359,10 @@ fn section(plane: &Plane) -> SliceState {
 
 /// Words about what a scene names that is not there.
 pub fn warnings(state: &SceneState, about: &About<'_>) -> Vec<String> {
-    let (field, number) = (about.field, output::number);
+    let field = about.field;
     let values = state.isosurfaces.iter().filter_map(|surface| surface.value);
     let missed = values.filter(|value| !(field.min..=field.max).contains(value)).map(|value| {
-        let [value, min, max] = [value, field.min, field.max].map(number);
+        let (value, [min, max]) = (output::exact(value), output::ends([field.min, field.max]));
         format!("isovalue {value}: {} has only values from {min} to {max}", field.name)
     });
     let sides = |slice: &SliceState| {
@@ -376,9 +376,10 @@ pub fn warnings(state: &SceneState, about: &About<'_>) -> Vec<String> {
         sides.iter().all(|side| *side > 0.0) || sides.iter().all(|side| *side < 0.0)
     });
     let apart = apart.map(|slice| {
-        let list = |p: [f64; 3]| p.map(number).join(",");
-        let [normal, min, max] = [slice.normal, about.bounds.min, about.bounds.max].map(list);
-        format!("section {normal},{}: the model lies inside the box {min},{max}", number(slice.offset))
+        let axis = |i: usize| output::ends([about.bounds.min[i], about.bounds.max[i]]);
+        let [min, max] = [0, 1].map(|end| [0, 1, 2].map(|i| axis(i)[end].clone()).join(","));
+        let normal = slice.normal.map(output::exact).join(",");
+        format!("section {normal},{}: the model lies inside the box {min},{max}", output::exact(slice.offset))
     });
     missed.chain(apart).collect()
 }

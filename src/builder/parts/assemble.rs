@@ -7,6 +7,7 @@ use crate::builder::append::{Appender, Ordered};
 use crate::builder::base::{Numbered, number_base};
 use crate::builder::collapses::report;
 use crate::builder::{BuildResult, BuildSummary, OnProgress};
+use crate::geom::lattice_box;
 use crate::mesh::NONE;
 use crate::mt::{ErrorCode, Exact, FieldInfo, VertexId};
 use std::collections::BTreeMap;
@@ -34,6 +35,7 @@ pub fn assemble(
     let listed = Listed::read(&plan, updates)?;
     let mut info = plan.info();
     info.updates = listed.vertices.len() as u32;
+    info.bounds = lattice_box(piece.positions.iter().copied());
     let level = |(&value, field): (&f64, &FieldInfo)| field.nearest(value);
     let levels: Vec<i32> = piece.values.iter().zip(info.fields.iter().cycle()).map(level).collect();
     let numbered = number_base(&piece.positions, &levels, info.fields.len(), &piece.tets);

@@ -61,6 +61,7 @@ impl<'a> GridCut<'a> {
             }
         }
         let Some(lattice) = position_lattice::of_grid(&grid, config) else { return Ok(None) };
+        position_lattice::check_scale(&lattice)?;
         let spare = ((grid.spacing[0] / lattice.step[0]) as u32).ilog2();
         let mut cut = Self {
             grid,
@@ -211,6 +212,7 @@ impl<'a> GridCut<'a> {
             updates: 0,
             displacement_per_error: config.displacement * Bounds::of(&ends).diagonal(),
             quantization: self.points().map(moved).fold(0.0, f64::max),
+            bounds: None,
         })
     }
 

@@ -302,6 +302,9 @@ impl<'a> Piecewise<'a> {
     /// The lattice over all pieces, as of the whole.
     fn lattice(&self) -> Result<Lattice, PartsError> {
         let of = |bits: u32| position_lattice::over(&self.sums.bounds, bits);
+        if position_lattice::check_scale(&of(WIDE_BITS)).is_err() {
+            return whole("its coordinates are too small or too large");
+        }
         if let Some(bits) = self.config.position_bits {
             let is_known = (1..=WIDE_BITS).contains(&bits);
             return if is_known && self.fits(&of(bits))? {

@@ -163,7 +163,7 @@ impl Plan {
         &self.metadata
     }
 
-    /// log2 of the updates of a block: encode with the same.
+    /// log2 of the updates of a block.
     pub fn block_bits(&self) -> u32 {
         self.block_bits
     }
@@ -226,6 +226,7 @@ impl Plan {
             updates: 0,
             displacement_per_error: self.displacement_per_error,
             quantization: self.quantization,
+            bounds: None,
         }
     }
 

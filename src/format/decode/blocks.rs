@@ -1,6 +1,6 @@
 //! Blocks and exact values that come by themselves: where they are in the file, and how their bytes are taken.
 
-use super::Decoder;
+use super::{Decoder, ExactStatus, Stage};
 use crate::format::header::{END_BYTES, HEAD_BYTES, Kind, SectionHead};
 use crate::format::read::Reader;
 use crate::format::{BlockInfo, FormatError, payload};
@@ -62,19 +62,37 @@ impl Decoder {
         (start < end).then_some(start..end)
     }
 
+    /// Whether the file keeps exact values, and whether they are here. Files whose header does not state their length keep none until
+    /// these have arrived.
+    pub fn exact_status(&self) -> ExactStatus {
+        // In files that come from front to back the end shows whether there were more.
+        let all_here = self.has_all_exact || matches!(self.stage, Stage::End);
+        match self.exact_range() {
+            Some(_) if !all_here => ExactStatus::Missing,
+            _ if !self.exact.is_empty() => ExactStatus::Here,
+            _ => ExactStatus::None,
+        }
+    }
+
     /// Takes in the bytes of [`Decoder::exact_range`] where blocks come by themselves; once is enough.
     ///
     /// # Errors
-    /// When the bytes are damaged, or all that comes in front of the blocks is not there yet; nothing has changed then.
+    /// When the bytes are not all of them, or damaged, or all that comes in front of the blocks is not there yet; nothing has changed
+    /// then.
     pub fn take_exact(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
         let Some(range) = self.exact_range().filter(|_| self.takes_blocks()) else {
             return Err(self.corrupt("there are no exact values, or not yet"));
         };
+        let end = range.start.saturating_add(bytes.len() as u64);
+        if end < range.end {
+            return Err(FormatError::Truncated { offset: end });
+        }
         let before = std::mem::take(&mut self.exact);
         let taken = self.read_exact_sections(bytes, range.start);
         if taken.is_err() {
             self.exact = before;
         }
+        self.has_all_exact |= taken.is_ok();
         taken
     }
 

@@ -9,7 +9,8 @@ use super::payload::exact::Corrections;
 use super::payload::{Metadata, State};
 use super::read::Reader;
 use super::{FormatError, Index, Limits, checksum};
-use crate::mt::{Mt, MtInfo, UpdatePages};
+use crate::geom::{Bounds, lattice_box};
+use crate::mt::{Mt, MtInfo, MultiTessellation, UpdatePages};
 pub use curve::ErrorBytes;
 use sections::{FileHead, OpenBlock};
 
@@ -29,6 +30,28 @@ pub struct Progress {
     pub total: Option<u64>,
     /// Updates that are there.
     pub updates: u32,
+}
+
+/// Whether a file keeps exact values, and whether they are here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExactStatus {
+    /// The file keeps none.
+    None,
+    /// It keeps some behind its blocks, and not all of that is here: it is still to come, or cut off.
+    Missing,
+    /// All are here.
+    Here,
+}
+
+impl ExactStatus {
+    /// The status in one word: `none`, `missing` or `here`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Missing => "missing",
+            Self::Here => "here",
+        }
+    }
 }
 
 /// What the next bytes belong to.
@@ -86,6 +109,8 @@ pub struct Decoder {
     block: Option<OpenBlock>,
     /// Exact values, by the field's number in the file.
     exact: Vec<(usize, Corrections)>,
+    /// Whether all that is behind the blocks has come by itself.
+    has_all_exact: bool,
     failed: Option<FormatError>,
 }
 
@@ -113,6 +138,7 @@ impl Decoder {
             next_block: 0,
             block: None,
             exact: Vec::new(),
+            has_all_exact: false,
             failed: None,
         }
     }
@@ -191,6 +217,19 @@ impl Decoder {
     pub fn histogram(&self, place: usize) -> Option<Vec<f64>> {
         let field = self.head.wanted.get(place)?;
         self.head.histograms.as_ref()?.shares(*field)
+    }
+
+    /// The box around the reference mesh, in model units: all meshes of the MT are in it. None before the base mesh is there. Files of
+    /// the first minor versions do not state it; then it is the box around the base mesh and all blocks as the index has them, which
+    /// may be larger by a 256th of the lattice at each side.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let (info, mt) = (self.head.info.as_ref()?, self.mt.as_ref()?);
+        if let Some(bounds) = info.model_bounds() {
+            return Some(bounds);
+        }
+        let blocks = self.head.index.iter().flat_map(|index| &index.blocks).flat_map(|block| block.bounds);
+        let bounds = lattice_box(mt.base().positions.iter().copied().chain(blocks));
+        MtInfo { bounds, ..info.clone() }.model_bounds()
     }
 
     /// How far the stream has come.

@@ -3,6 +3,7 @@
 use super::{Decoder, Stage};
 use crate::format::coder::{Models, Source};
 use crate::format::header::{HEAD_BYTES, Kind, SectionHead, Start, VERSION_AT, version_for};
+use crate::format::payload::bounds;
 use crate::format::payload::edge::FieldPart;
 use crate::format::payload::exact::Corrections;
 use crate::format::payload::histogram::Histograms;
@@ -99,6 +100,7 @@ impl Decoder {
             Kind::INFO => self.open_info(content)?,
             Kind::INDX => self.open_index(content)?,
             Kind::HIST => self.open_histograms(content)?,
+            Kind::BOUNDS => self.open_bounds(content)?,
             Kind::MODL => self.open_models(content)?,
             Kind::BASE => self.open_base(content)?,
             Kind::FLDB => self.open_base_field(content)?,
@@ -134,7 +136,7 @@ impl Decoder {
         }
         let offset = self.bytes;
         let (info, metadata) = payload::read_info(content)?;
-        if self.head.start.version[0] < version_for(info.kind, false)[0] {
+        if self.head.start.version[0] < version_for(info.kind, false, false)[0] {
             let what = "the version of the file does not go with the kind of MT in it";
             return Err(FormatError::Corrupt { offset: VERSION_AT, what });
         }
@@ -171,11 +173,26 @@ impl Decoder {
 
     pub(super) fn open_histograms(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let fields = self.head.fields();
+        let has_bounds = self.head.info.as_ref().is_some_and(|info| info.bounds.is_some());
         let FileHead { index: Some(_), histograms: histograms @ None, models: None, .. } = &mut self.head
         else {
             return Err(content.out_of_place());
         };
+        if has_bounds {
+            return Err(content.out_of_place());
+        }
         *histograms = Some(Histograms::read(content, fields)?);
+        Ok(())
+    }
+
+    pub(super) fn open_bounds(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let FileHead { info: Some(info), index: Some(_), models: None, .. } = &mut self.head else {
+            return Err(content.out_of_place());
+        };
+        if info.bounds.is_some() {
+            return Err(content.out_of_place());
+        }
+        info.bounds = Some(bounds::read(content, info.lattice.bits)?);
         Ok(())
     }
 

@@ -116,7 +116,7 @@ fn runs(mt: &EdgeMt, first: u32, vertices: &[u32]) -> Vec<u32> {
 
 /// Puts the splits `first .. end` of an MT.
 pub fn put(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32) {
-    let vertices: Vec<u32> = (first..end).map(|k| mt.update(UpdateId(k)).vertex.0).collect();
+    let vertices: Vec<u32> = (first..end).map(|k| mt.split_vertex(UpdateId(k)).0).collect();
     put_vertices(out, mt, first, &vertices);
     let leads = |k| {
         let (offset, edge) = offset_of(mt, UpdateId(k));
@@ -125,7 +125,7 @@ pub fn put(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32) {
     let all_lead = (first..end).all(leads);
     out.bits(u32::from(all_lead), 1);
     for k in first..end {
-        let update = mt.update(UpdateId(k));
+        let update = mt.update_without_levels(UpdateId(k));
         let above = mt.created_by(update.vertex).map(|u| offset_of(mt, u));
         put_offset(out, above, offset_of(mt, UpdateId(k)), all_lead);
         put_mask(out, update.wrong_sides);
@@ -166,7 +166,7 @@ fn put_vertices(out: &mut impl Put, mt: &EdgeMt, first: u32, vertices: &[u32]) {
 pub type Offset = ([i32; 3], u8);
 
 fn offset_of(mt: &EdgeMt, u: UpdateId) -> Offset {
-    let update = mt.update(u);
+    let update = mt.update_without_levels(u);
     (update.offset_residual, update.edge)
 }
 
@@ -204,8 +204,7 @@ fn put_mask(out: &mut impl Put, mask: u64) {
 /// Puts what the splits `first .. end` of an MT do to a field.
 pub fn put_field(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32, field: usize) {
     put_changes(out, [ERROR, LEVEL], (first..end).map(UpdateId), |u| {
-        let update = mt.update(u);
-        (update.errors[field], update.level_residuals[field])
+        (mt.error_of_field(u, field), mt.level_residuals(u).nth(field).unwrap_or(0))
     });
 }
 

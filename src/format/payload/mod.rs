@@ -2,6 +2,7 @@
 //! of MT.
 
 mod base;
+pub mod bounds;
 pub mod edge;
 pub mod exact;
 mod explicit;
@@ -98,6 +99,7 @@ pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatErr
         updates,
         displacement_per_error,
         quantization: 0.0,
+        bounds: None,
     };
     read_more(&mut reader, &mut info)?;
     reader.end()?;
@@ -328,7 +330,8 @@ impl BaseParts {
         Ok(match info.kind {
             MtKind::Edge => (EdgeMt::with_page_bits(info, base, block_bits).into(), None),
             MtKind::Vertex => {
-                let (mt, state) = vertex::start(info, base, vertex, tet_errors)?;
+                let (mut mt, state) = vertex::start(info, base, vertex, tet_errors)?;
+                mt.set_page_bits(block_bits);
                 (mt.into(), Some(state))
             }
             MtKind::HalfEdge => {
@@ -337,6 +340,7 @@ impl BaseParts {
             }
             MtKind::Explicit => {
                 let mut mt = ExplicitMt::new(info, base);
+                mt.set_page_bits(block_bits);
                 if tet_errors {
                     mt.set_tet_errors(Vec::new(), vec![0; mt.tets().len()])?;
                 }
@@ -470,7 +474,7 @@ impl Shared {
                         vertex: VertexId(splits.vertices[k]),
                         offset_residual: splits.offsets[k].0,
                         edge: splits.offsets[k].1,
-                        level_residuals,
+                        level_residuals: level_residuals.into(),
                         wrong_sides: splits.masks[k],
                         errors,
                     })

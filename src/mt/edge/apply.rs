@@ -45,7 +45,7 @@ impl EdgeMt {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
-        let update = self.update(u);
+        let update = self.update_without_levels(u);
         let vertex = update.vertex;
         let Some(p) = mesh.slot(vertex) else {
             let error = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
@@ -58,7 +58,7 @@ impl EdgeMt {
         let mut ring = take_ring(mesh);
         let mut field_offsets = std::mem::take(&mut ring.field_offsets);
         field_offsets.clear();
-        field_offsets.extend_from_slice(update.level_residuals);
+        field_offsets.extend(self.level_residuals(u));
         let applied = self.split_ring(mesh, u, &update, p, &mut ring, &mut field_offsets);
         ring.field_offsets = field_offsets;
         mesh.put_back_kind_state(ring);
@@ -254,7 +254,7 @@ impl EdgeMt {
         let far_vertex = mesh.labels[q as usize].vertex;
         mesh.slot_of.set(far_vertex, NONE);
         mesh.free_vertex(q);
-        mesh.put_vertex(p, self.labels(self.update(u).vertex), position);
+        mesh.put_vertex(p, self.labels(self.split_vertex(u)), position);
         Ok(Applied::Done)
     }
 
@@ -376,12 +376,12 @@ impl UpdatePages for EdgeMt {
     }
 
     fn update_bytes(&self) -> u64 {
-        self.record.bytes(self.info())
+        self.record.bytes()
     }
 
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
         for u in updates.map(UpdateId).filter(|u| self.has(*u)) {
-            if let Some(slot) = mesh.slot(self.update(u).vertex) {
+            if let Some(slot) = mesh.slot(self.split_vertex(u)) {
                 mesh.labels[slot as usize].kind_word = KindWord(u.0);
                 mesh.touch_star(slot);
             }
@@ -390,7 +390,7 @@ impl UpdatePages for EdgeMt {
 
     fn page_evicted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
         for u in updates.clone().map(UpdateId).filter(|u| self.has(*u)) {
-            if let Some(slot) = mesh.slot(self.update(u).vertex) {
+            if let Some(slot) = mesh.slot(self.split_vertex(u)) {
                 mesh.labels[slot as usize].kind_word = KindWord::NONE;
             }
         }
@@ -422,7 +422,7 @@ impl ApplyUpdates for EdgeMt {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
-        mesh.find_star(u, self.update(u).vertex, found)
+        mesh.find_star(u, self.split_vertex(u), found)
     }
 
     fn find_inserted(
@@ -472,7 +472,7 @@ impl ApplyUpdates for EdgeMt {
         // One of the vertices that the one to be split comes from, or of those that come from what it becomes.
         let (mut above, mut below) = (Some(u), Some(u));
         while above.is_some() || below.is_some() {
-            let coarse = above.map(|u| self.update(u).vertex);
+            let coarse = above.map(|u| self.split_vertex(u));
             let fine = below.map(|u| self.created(u)[0]);
             if let Some(slot) = [coarse, fine].into_iter().flatten().find_map(|v| mesh.slot(v)) {
                 return mesh.positions[slot as usize];

@@ -11,6 +11,7 @@ use crate::mt::{
 };
 #[cfg(feature = "build")]
 use crate::mt::{MAX_STAR, VertexId};
+use std::borrow::Cow;
 
 /// Makes an [`EdgeMt`] from vertex splits, coarse to fine: applies each to the mesh of all before it and stores what it does as
 /// residuals against the prediction from that mesh.
@@ -104,10 +105,10 @@ fn to_residuals<'a>(
         });
         let wrong_sides = link.wrong(&ring, ring.sides);
         let VertexSplit { vertex, errors, .. } = *split;
-        EdgeUpdate { vertex, offset_residual, edge, level_residuals: &[], wrong_sides, errors }
+        EdgeUpdate { vertex, offset_residual, edge, level_residuals: Cow::Borrowed(&[]), wrong_sides, errors }
     });
     mesh.put_back_kind_state(ring);
-    Ok(EdgeUpdate { level_residuals: residuals, ..stored? })
+    Ok(EdgeUpdate { level_residuals: Cow::Borrowed(residuals), ..stored? })
 }
 
 #[cfg(feature = "build")]

@@ -20,9 +20,9 @@ use crate::mt::other_kinds::OtherKind;
 use crate::mt::pages::{Page, Pages};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
-    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PAGE_BITS, PageError, UpdateError, UpdateId,
-    VertexId,
+    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId, VertexId,
 };
+use std::borrow::Cow;
 
 /// Largest number of tetrahedra around a vertex that an update splits.
 pub const MAX_STAR: usize = 64;
@@ -56,7 +56,7 @@ pub struct VertexSplit<'a> {
 
 /// One update of an edge-based MT, as it is stored: a [`VertexSplit`] whose parts are residuals against the prediction from the
 /// star.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EdgeUpdate<'a> {
     /// The vertex that is split.
     pub vertex: VertexId,
@@ -66,7 +66,7 @@ pub struct EdgeUpdate<'a> {
     /// have the largest numbers, and taken in the direction in which the first coordinate that changes grows.
     pub edge: u8,
     /// What is added to the predicted offsets in levels, field by field.
-    pub level_residuals: &'a [i32],
+    pub level_residuals: Cow<'a, [i32]>,
     /// Bit `i` is 1 where the predicted side of a tetrahedron is wrong: the `i`-th one, counted from the one whose side is the
     /// least certain.
     pub wrong_sides: u64,
@@ -74,15 +74,15 @@ pub struct EdgeUpdate<'a> {
     pub errors: &'a [ErrorCode],
 }
 
-/// A compact edge-based MT. With one field an update, and so a reference vertex, takes 32 bytes, on lattices of more
-/// than 17 bits 40, and 2 for the error; the base mesh, which is small, comes on top.
+/// A compact edge-based MT. With one field of 16 bits an update, and so a reference vertex, takes 32 bytes, on lattices of more
+/// than 21 bits 36, and 2 for the error; the base mesh, which is small, comes on top.
 ///
 /// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT. Or else it comes and goes in pages of
 /// updates, by [`insert_page`](EdgeMt::insert_page) and [`remove_page`](crate::mt::UpdatePages::remove_page): every set of pages that holds
 /// with each page all those on which it depends is an MT, too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EdgeMt {
-    info: MtInfo,
+    pub(in crate::mt) info: MtInfo,
     base: BaseMesh,
     /// `s(v)` for the vertices of the base mesh, [`WHOLE`] while nothing splits them.
     base_splits: Vec<i32>,
@@ -98,12 +98,14 @@ pub(super) struct EdgePage {
     errors: Errors,
 }
 
-/// What the words of an update are: the vertex that it splits, `s(v')`, `s(v'')`, two for the mask, the offset, and one for
-/// the offset in each field.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What the words of an update are: the vertex that it splits, `s(v')`, `s(v'')`, two for the mask, and as many as hold, bit by bit,
+/// the components of the offset, the edge that it is counted from, and the offset in each field.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Record {
-    /// Words of the offset and the edge that it is counted from: 2 where they share them, 4 on fine lattices.
-    offset: usize,
+    /// Bits of a component of an offset.
+    component: u32,
+    /// Bits of the offset in each field.
+    levels: Vec<u32>,
     /// Words of an update.
     len: usize,
 }
@@ -114,44 +116,75 @@ const WHOLE: i32 = NONE as i32;
 const VERTEX: usize = 0;
 const SPLITS: usize = 1;
 const MASK: usize = 3;
-const OFFSET: usize = 5;
-/// Bits of a component of an offset where components share words: seven bits are left for the edge.
-const COMPONENT_BITS: u32 = 19;
+const PACKED: usize = 5;
+/// Bits of the edge that an offset is counted from.
+const EDGE_BITS: u32 = u8::BITS - MAX_EDGE.leading_zeros();
 
 impl Record {
     fn new(info: &MtInfo) -> Self {
-        // An offset has at most 2^bits, included, and a sign.
-        let offset = if info.lattice.bits + 2 <= COMPONENT_BITS { 2 } else { 4 };
-        Self { offset, len: OFFSET + offset + info.fields.len() }
+        // An offset has at most 2^bits, included, and a sign; that in a field at most twice as much.
+        let component = info.lattice.bits + 2;
+        let levels: Vec<u32> = info.fields.iter().map(|field| field.bits + 3).collect();
+        let packed = 3 * component + EDGE_BITS + levels.iter().sum::<u32>();
+        Self { component, levels, len: PACKED + packed.div_ceil(u32::BITS) as usize }
     }
 
     /// Bytes of an update, its errors included.
-    pub fn bytes(self, info: &MtInfo) -> u64 {
-        let fields = info.fields.len();
-        let errors = if fields == 1 { 1 } else { fields + 1 };
+    pub fn bytes(&self) -> u64 {
+        let errors = if self.levels.len() == 1 { 1 } else { self.levels.len() + 1 };
         (self.len * size_of::<i32>() + errors * size_of::<ErrorCode>()) as u64
     }
 
-    fn push(self, words: &mut Vec<i32>, update: &EdgeUpdate<'_>) {
+    fn push(&self, words: &mut Vec<i32>, update: &EdgeUpdate<'_>) {
         let halves = |word: u64| [word as i32, (word >> 32) as i32];
         let (vertex, [low, high]) = (update.vertex.0 as i32, halves(update.wrong_sides));
+        let first = words.len();
         words.extend_from_slice(&[vertex, WHOLE, WHOLE, low, high]);
-        let [x, y, z] = update.offset_residual;
-        match self.offset {
-            2 => words.extend_from_slice(&halves(pack(update.offset_residual, update.edge))),
-            _ => words.extend_from_slice(&[x, y, z, i32::from(update.edge)]),
-        }
-        words.extend_from_slice(update.level_residuals);
+        words.resize(first + self.len, 0);
+        let packed = &mut words[first + PACKED..];
+        let mut at = 0;
+        let mut put = |number: i32, bits: u32| {
+            let number = (number as u32 as u64 & ((1 << bits) - 1)) << (at % u32::BITS);
+            let word = (at / u32::BITS) as usize;
+            packed[word] |= number as i32;
+            if let Some(next) = packed.get_mut(word + 1) {
+                *next |= (number >> 32) as i32;
+            }
+            at += bits;
+        };
+        update.offset_residual.iter().for_each(|&d| put(d, self.component));
+        put(i32::from(update.edge), EDGE_BITS);
+        update.level_residuals.iter().zip(&self.levels).for_each(|(&d, &bits)| put(d, bits));
     }
 
     /// The residual of the offset and the edge that it is counted from.
     #[inline]
-    fn offset(self, words: &[i32]) -> ([i32; 3], u8) {
-        match self.offset {
-            2 => unpack(two(words, OFFSET)),
-            _ => ([0, 1, 2].map(|axis| words[OFFSET + axis]), words[OFFSET + 3] as u8),
-        }
+    fn offset(&self, words: &[i32]) -> ([i32; 3], u8) {
+        let offset = [0, 1, 2].map(|axis| signed(words, axis * self.component, self.component));
+        let edge = signed(words, 3 * self.component, EDGE_BITS) as u8 & MAX_EDGE;
+        (offset, edge)
     }
+
+    /// The residuals of the levels, field by field.
+    #[inline]
+    fn levels<'a>(&'a self, words: &'a [i32]) -> impl Iterator<Item = i32> + 'a {
+        let first = 3 * self.component + EDGE_BITS;
+        self.levels.iter().scan(first, |at, &bits| {
+            let level = signed(words, *at, bits);
+            *at += bits;
+            Some(level)
+        })
+    }
+}
+
+/// A signed number of so many bits, 1 to 32, of the packed ones of an update, from bit `at` of these on.
+#[inline]
+fn signed(words: &[i32], at: u32, bits: u32) -> i32 {
+    let word = PACKED + (at / u32::BITS) as usize;
+    let (low, high) = (words[word] as u32, words.get(word + 1).map_or(0, |&high| high as u32));
+    let both = (u64::from(low) | u64::from(high) << 32) >> (at % u32::BITS);
+    // Shifted up to the top of the word and down again, it brings its sign along.
+    ((both << (u64::BITS - bits)) as i64 >> (u64::BITS - bits)) as i32
 }
 
 #[inline]
@@ -161,7 +194,7 @@ fn two(words: &[i32], at: usize) -> u64 {
 
 impl EdgePage {
     /// Adds the next update, which has been checked.
-    fn push(&mut self, record: Record, update: &EdgeUpdate<'_>) {
+    fn push(&mut self, record: &Record, update: &EdgeUpdate<'_>) {
         let complete = self.errors.push(update.errors);
         assert!(complete, "each field has an error: that is checked");
         record.push(&mut self.words, update);
@@ -181,7 +214,7 @@ impl Page for EdgePage {
 impl EdgeMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`](crate::mt::BaseMesh::check).
     pub fn new(info: MtInfo, base: BaseMesh) -> Self {
-        Self::with_page_bits(info, base, PAGE_BITS)
+        Self::with_page_bits(info, base, MtKind::Edge.usual_block_bits())
     }
 
     /// [`EdgeMt::new`] with pages of `2^bits` updates, of `2^16` at most.
@@ -226,7 +259,7 @@ impl EdgeMt {
             Some(word) if *word == WHOLE => *word = update as i32,
             _ => return Err(UpdateError::Vertex { update, vertex }),
         }
-        let (record, fields) = (self.record, self.info.fields.len());
+        let (record, fields) = (&self.record, self.info.fields.len());
         self.pages.push(|updates| new_page(record, fields, updates.len()), |page| page.push(record, new));
         Ok(UpdateId(update))
     }
@@ -259,11 +292,11 @@ impl EdgeMt {
     /// [`EdgeMt::push`] would refuse. The MT is as it was then.
     pub fn insert_page(&mut self, page: u32, splits: &[EdgeUpdate<'_>]) -> Result<(), PageError> {
         let updates = self.pages.check_new(page, splits.len())?;
-        let mut new = new_page(self.record, self.info.fields.len(), updates.len());
+        let mut new = new_page(&self.record, self.info.fields.len(), updates.len());
         for (update, split) in updates.clone().zip(splits) {
             self.check(update, split)?;
             self.check_vertex(page, update, split.vertex)?;
-            new.push(self.record, split);
+            new.push(&self.record, split);
         }
         self.pages.insert(page, new);
         for (k, (update, split)) in updates.zip(splits).enumerate() {
@@ -336,18 +369,35 @@ impl EdgeMt {
     ///
     /// # Panics
     /// If the MT has no update `u`, or not here.
-    #[inline]
     pub fn update(&self, u: UpdateId) -> EdgeUpdate<'_> {
+        EdgeUpdate { level_residuals: self.level_residuals(u).collect(), ..self.update_without_levels(u) }
+    }
+
+    /// The same but for the levels, which are left empty.
+    #[inline]
+    pub(crate) fn update_without_levels(&self, u: UpdateId) -> EdgeUpdate<'_> {
         let words = self.words(u);
         let (offset_residual, edge) = self.record.offset(words);
         EdgeUpdate {
             vertex: VertexId(words[VERTEX] as u32),
             offset_residual,
             edge,
-            level_residuals: &words[OFFSET + self.record.offset..],
+            level_residuals: Cow::Borrowed(&[]),
             wrong_sides: two(words, MASK),
             errors: self.errors(u),
         }
+    }
+
+    /// The vertex that update `u`, which is here, splits.
+    #[inline]
+    pub(crate) fn split_vertex(&self, u: UpdateId) -> VertexId {
+        VertexId(self.words(u)[VERTEX] as u32)
+    }
+
+    /// [`EdgeUpdate::level_residuals`] of update `u`, which is here.
+    #[inline]
+    pub(crate) fn level_residuals(&self, u: UpdateId) -> impl Iterator<Item = i32> + '_ {
+        self.record.levels(self.words(u))
     }
 
     /// `s(v')` and `s(v'')` of the vertices that update `u`, which is here, creates.
@@ -381,7 +431,7 @@ impl EdgeMt {
     }
 }
 
-fn new_page(record: Record, fields: usize, updates: usize) -> EdgePage {
+fn new_page(record: &Record, fields: usize, updates: usize) -> EdgePage {
     EdgePage {
         words: Vec::with_capacity(updates * record.len),
         errors: Errors::with_capacity(fields, updates),
@@ -401,34 +451,69 @@ impl MultiTessellation for EdgeMt {
     }
 }
 
-/// Three components in one word, and the number of an edge above them.
-fn pack(offset: [i32; 3], edge: u8) -> u64 {
-    let [x, y, z] = offset.map(|d| d as u64 & ((1 << COMPONENT_BITS) - 1));
-    x | y << COMPONENT_BITS | z << (2 * COMPONENT_BITS) | u64::from(edge) << (3 * COMPONENT_BITS)
-}
-
-#[inline]
-fn unpack(word: u64) -> ([i32; 3], u8) {
-    // Shifted up to the top of the word and down again, each component brings its sign along.
-    let offset = [2, 1, 0].map(|above| {
-        let top = word << (64 - 3 * COMPONENT_BITS + above * COMPONENT_BITS);
-        (top as i64 >> (64 - COMPONENT_BITS)) as i32
-    });
-    (offset, (word >> (3 * COMPONENT_BITS)) as u8)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::Lattice;
+    use crate::mt::FieldInfo;
 
+    /// All sizes of lattices, with the largest numbers of each, and some in between.
     #[test]
-    fn offsets_come_back_from_a_word() {
-        for largest in [2, 1 << 8, 1_i32 << (COMPONENT_BITS - 2)] {
-            let values = [-largest, 1 - largest, -1, 0, 1, largest - 1, largest];
+    fn what_is_packed_comes_back() {
+        for (bits, fields) in (1..=30).flat_map(|bits| [1, 2, 7].map(|fields| (bits, fields))) {
+            let of = |f: u32| FieldInfo { bits: 1 + (bits + 5 * f) % 24, ..FieldInfo::default() };
+            let info = MtInfo {
+                kind: MtKind::Edge,
+                lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits },
+                fields: (0..fields).map(of).collect(),
+                vertices: 1,
+                tetrahedra: 1,
+                updates: 1,
+                displacement_per_error: 1.0,
+                quantization: 0.0,
+                bounds: None,
+            };
+            let record = Record::new(&info);
+            let ends = |bits: u32, i: usize| {
+                let largest = 1_i32 << bits;
+                [-largest, 1 - largest, -1, 0, 1, largest - 1, largest][i % 7]
+            };
             for (i, edge) in (0..343).zip((0..=MAX_EDGE).cycle()) {
-                let offset = [values[i % 7], values[i / 7 % 7], values[i / 49]];
-                assert_eq!(unpack(pack(offset, edge)), (offset, edge));
+                let offset_residual = [i, i / 7, i / 49].map(|i| ends(bits, i));
+                let level = |(f, field): (usize, &FieldInfo)| ends(field.bits + 1, i + 3 * f);
+                let levels: Vec<i32> = info.fields.iter().enumerate().map(level).collect();
+                let update = EdgeUpdate {
+                    vertex: VertexId(7),
+                    offset_residual,
+                    edge,
+                    level_residuals: (&levels[..]).into(),
+                    wrong_sides: u64::MAX - 5,
+                    errors: &[],
+                };
+                let mut words = vec![-1; 3];
+                record.push(&mut words, &update);
+                let words = &words[3..];
+                assert_eq!(words.len(), record.len);
+                assert_eq!((words[VERTEX], two(words, MASK)), (7, u64::MAX - 5));
+                assert_eq!(record.offset(words), (offset_residual, edge), "{bits} bits");
+                assert!(record.levels(words).eq(levels.iter().copied()), "{bits} bits");
             }
         }
+    }
+
+    #[test]
+    fn an_update_takes_at_most_38_bytes() {
+        let info = |bits| MtInfo {
+            kind: MtKind::Edge,
+            lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits },
+            fields: vec![FieldInfo { bits: 16, ..FieldInfo::default() }],
+            vertices: 1,
+            tetrahedra: 1,
+            updates: 1,
+            displacement_per_error: 1.0,
+            quantization: 0.0,
+            bounds: None,
+        };
+        assert_eq!([16, 21, 22, 30].map(|bits| Record::new(&info(bits)).bytes()), [34, 34, 38, 38]);
     }
 }

@@ -41,7 +41,7 @@ pub struct ExplicitUpdate<'a> {
 /// It grows by [`push`](ExplicitMt::push), coarse to fine; every prefix of an MT is an MT.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExplicitMt {
-    info: MtInfo,
+    pub(in crate::mt) info: MtInfo,
     base: BaseMesh,
     positions: Vec<[i32; 3]>,
     levels: Vec<i32>,
@@ -62,6 +62,8 @@ pub struct ExplicitMt {
     pub(super) to_come: ErrorCode,
     /// Whether every update so far inserts more tetrahedra than it removes.
     pub(in crate::mt) always_grows: bool,
+    /// See [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
+    pub(super) page_bits: u32,
     kind: OtherKind,
 }
 
@@ -112,8 +114,14 @@ impl ExplicitMt {
             to_come: ErrorCode::MAX,
             always_grows: true,
             base,
+            page_bits: MtKind::Explicit.usual_block_bits(),
             kind: OtherKind::new(),
         }
+    }
+
+    /// Notes how many updates a block of its file has: see [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
+    pub(crate) fn set_page_bits(&mut self, bits: u32) {
+        self.page_bits = bits;
     }
 
     /// Adds the next update.
@@ -471,6 +479,7 @@ mod tests {
             updates: 2,
             displacement_per_error: 1.0,
             quantization: 0.0,
+            bounds: None,
         };
         let axes = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
         let mut positions = vec![[64; 3]];

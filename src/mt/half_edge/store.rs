@@ -69,7 +69,7 @@ pub struct HalfEdgeUpdate<'a> {
 /// [`remove_page`](crate::mt::UpdatePages::remove_page), in any order. An update can be applied once it and all that it depends on are here.
 #[derive(Clone, Debug)]
 pub struct HalfEdgeMt {
-    info: MtInfo,
+    pub(in crate::mt) info: MtInfo,
     base: BaseMesh,
     base_marks: Vec<BaseMark>,
     base_children: Rows<ForestChild>,

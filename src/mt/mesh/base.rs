@@ -49,6 +49,12 @@ impl BaseMesh {
         if self.values.len() != self.positions.len() * info.fields.len() {
             return Err(BaseMeshError::Info("field levels and vertices differ in number"));
         }
+        let is_outside = |p: &[i32; 3]| {
+            info.bounds.is_some_and(|[low, high]| (0..3).any(|k| p[k] < low[k] || p[k] > high[k]))
+        };
+        if self.positions.iter().any(is_outside) {
+            return Err(BaseMeshError::Info("the base mesh is not within the box of the reference mesh"));
+        }
         for (i, (position, levels)) in
             self.positions.iter().zip(self.values.chunks(info.fields.len())).enumerate()
         {
@@ -102,6 +108,13 @@ impl MtInfo {
             if field.bits == 0 || field.bits > MAX_FIELD_BITS {
                 return Err(BaseMeshError::Info("field bits must be 1 to 24"));
             }
+        }
+        let largest = 1 << lattice.bits;
+        let is_box = |[low, high]: [[i32; 3]; 2]| {
+            (0..3).all(|k| 0 <= low[k] && low[k] <= high[k] && high[k] <= largest)
+        };
+        if !self.bounds.is_none_or(is_box) {
+            return Err(BaseMeshError::Info("the box of the reference mesh must be on the lattice"));
         }
         if !self.quantization.is_finite() || self.quantization < 0.0 {
             return Err(BaseMeshError::Info("what the lattice rounds off must be finite and not negative"));

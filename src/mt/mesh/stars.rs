@@ -283,6 +283,7 @@ pub(in crate::mt) mod tests {
             updates: 0,
             displacement_per_error: 1.0,
             quantization: 0.0,
+            bounds: None,
         };
         let middle = 1 << 15;
         let mut positions = vec![[middle, middle, 0], [middle, middle, 100]];

@@ -544,6 +544,10 @@ impl VertexMt {
 }
 
 impl UpdatePages for VertexMt {
+    fn page_bits(&self) -> u32 {
+        self.page_bits
+    }
+
     fn set_to_come(&mut self, bounds: &[ErrorCode]) {
         let bound = bounds.iter().copied().max().filter(|_| self.updates() < self.info().updates);
         self.to_come = bound.unwrap_or(ErrorCode::MAX);

@@ -33,7 +33,7 @@ use super::tet_errors::MAX_QUARTERINGS;
 use crate::mesh::NONE;
 use crate::mt::other_kinds::OtherKind;
 use crate::mt::update_errors::Errors;
-use crate::mt::{BaseMesh, ErrorCode, MtInfo, MultiTessellation, UpdateError, UpdateId, VertexId};
+use crate::mt::{BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId};
 
 /// A member of a loop, and which of its links leads on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +80,8 @@ pub struct VertexMt {
     shape_bits: u64,
     /// While the nodes have neither links nor removers: what is instead of them.
     pub(in crate::mt) growing: Option<Box<Growing>>,
+    /// See [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
+    pub(super) page_bits: u32,
     kind: OtherKind,
 }
 
@@ -93,6 +95,11 @@ const UNIT: u64 = 4;
 pub struct NodeBits(pub(in crate::mt) Bits);
 
 impl VertexMt {
+    /// Notes how many updates a block of its file has: see [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
+    pub(crate) fn set_page_bits(&mut self, bits: u32) {
+        self.page_bits = bits;
+    }
+
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`]. `base_removers` has for each base
     /// tetrahedron which update removes it, [`u32::MAX`] if none does; `most_children` is the largest number of children
     /// that an update has, at most [`MAX_INSERTED`]; `always_grows` whether every insertion inserts more tetrahedra than
@@ -138,6 +145,7 @@ impl VertexMt {
             to_come: ErrorCode::MAX,
             shape_bits: 0,
             growing: None,
+            page_bits: MtKind::Vertex.usual_block_bits(),
             kind: OtherKind::new(),
         })
     }

@@ -35,6 +35,8 @@ pub struct File {
     pub index: Index,
     /// By field; empty if there are none.
     pub histograms: Vec<Vec<u32>>,
+    /// The box around the reference mesh, if it is stated.
+    pub bounds: Option<[[i32; 3]; 2]>,
     tables: Vec<Table>,
     pub base: Growth,
     /// In files of kind 1.
@@ -68,6 +70,12 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     let (index, index_end) = (wire::index(section.payload, &info), section.range[1]);
     let histograms = histogram::find(front, &info);
     assert!(histograms.is_empty() || file[10] > 0, "what minor version 1 adds");
+    let place = |kind: &[u8; 4]| front.iter().position(|section| &section.kind == kind);
+    let bounds = place(b"bbox").map(|at| {
+        assert!(file[10] > 1, "what minor version 2 adds");
+        assert!(place(b"hist").max(place(b"INDX")) < Some(at) && Some(at) < place(b"MODL"));
+        wire::bounds(front[at].payload, &info)
+    });
     let tables = coded::tables(next(b"MODL").payload, info.kind);
     let mut payload = next(b"BASE").payload;
     let [vertices, tets] = [payload.varint(), payload.varint()];
@@ -121,6 +129,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
             tet_errors,
             index,
             histograms,
+            bounds,
             tables,
             base,
             start,

@@ -205,6 +205,17 @@ fn more(bytes: &mut Bytes<'_>, info: &mut Info) {
     }
 }
 
+/// The least and the largest corner of the box around the reference mesh.
+pub fn bounds(mut bytes: Bytes<'_>, info: &Info) -> [[i32; 3]; 2] {
+    let axes = [0; 3].map(|_| {
+        let (low, more) = (u64::from(bytes.varint()), u64::from(bytes.varint()));
+        assert!(low + more <= 1 << info.bits);
+        [low as i32, (low + more) as i32]
+    });
+    bytes.end();
+    [0, 1].map(|end| axes.map(|axis| axis[end]))
+}
+
 /// What the index tells of a block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BlockEntry {

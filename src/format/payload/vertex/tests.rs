@@ -19,6 +19,7 @@ fn info() -> MtInfo {
         updates: 0,
         displacement_per_error: 0.0,
         quantization: 0.0,
+        bounds: None,
     }
 }
 

@@ -1,0 +1,98 @@
+// Arrays of single precision that are relative to an origin, and what libraries of graphics get of them.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { applyChanges, emptyMesh } from "../../pkg-template/changes.js";
+import { absolute } from "../../pkg-template/surfaces.js";
+import { createSurface as createThreeSurface } from "../../pkg-template/three.js";
+import { createSurface as createVtkSurface } from "../../pkg-template/vtk.js";
+
+const FAR = { origin: [600_000, 5_800_000.25, 0], offset: 1.7e9, scale: 2 };
+const NEAR = { origin: [0, 0, 0], offset: 0, scale: 1 };
+const triangle = {
+  positions: Float32Array.of(0.1, 0.2, 0.3, 1, 0, 0, 0, 1, 0),
+  normals: Float32Array.of(0, 0, 1, 0, 0, 1, 0, 0, 1),
+  values: Float32Array.of(-1, 0.5, 2),
+  indices: Uint32Array.of(0, 1, 2),
+};
+const places = [...triangle.positions].map((x, i) => FAR.origin[i % 3] + x);
+const values = [...triangle.values].map((v) => FAR.offset + FAR.scale * v);
+
+test("absolute numbers are copies in double precision only where they must be", () => {
+  const near = absolute({ ...triangle, ...NEAR });
+  assert.equal(near.positions, triangle.positions);
+  assert.equal(near.values, triangle.values);
+  const far = absolute({ ...triangle, ...FAR });
+  assert.ok(far.positions instanceof Float64Array && far.values instanceof Float64Array);
+  assert.deepEqual([...far.positions], places);
+  assert.deepEqual([...far.values], values);
+  assert.equal(absolute({ positions: triangle.positions, ...NEAR }).values, undefined);
+});
+
+test("meshes that are kept up know what they are relative to", () => {
+  const none = new Uint32Array();
+  const delta = {
+    ...FAR,
+    vertexCount: 1,
+    tetCount: 0,
+    positions: Float32Array.of(1, 2, 3),
+    field: Float32Array.of(4),
+    tets: none,
+    neighbors: none,
+    changes: { from: 0, to: 1, vertices: Uint32Array.of(0, 1), tets: none },
+  };
+  const empty = emptyMesh();
+  assert.deepEqual([empty.origin, empty.offset, empty.scale], [[0, 0, 0], 0, 1]);
+  const { origin, offset, scale } = applyChanges(empty, delta);
+  assert.deepEqual({ origin, offset, scale }, FAR);
+});
+
+/** As much of three.js as an adapter takes. */
+class BufferGeometry {
+  attributes = {};
+  index = null;
+  getAttribute = (name) => this.attributes[name];
+  setAttribute = (name, attribute) => (this.attributes[name] = attribute);
+  deleteAttribute = (name) => delete this.attributes[name];
+  setIndex = (attribute) => (this.index = attribute);
+  setDrawRange() {}
+  dispose() {}
+}
+class BufferAttribute {
+  constructor(array, size) {
+    Object.assign(this, { array, size });
+  }
+  setUsage() {}
+  clearUpdateRanges() {}
+  addUpdateRange() {}
+}
+class Box3 {
+  setFromArray() {}
+  getBoundingSphere() {}
+}
+const three = { BufferGeometry, BufferAttribute, Box3, Sphere: class {} };
+
+test("three.js gets positions relative to an origin, and colours of absolute values", async () => {
+  const volume = { isosurface: async () => ({ ...triangle, ...FAR }) };
+  const seen = [];
+  const color = (value) => {
+    seen.push(value);
+    return [0, 0, 0];
+  };
+  const surface = await createThreeSurface(/** @type {any} */ (volume), { isosurface: 1 }, { three: /** @type {any} */ (three), color });
+  assert.deepEqual([surface.origin, surface.offset, surface.scale], [FAR.origin, FAR.offset, FAR.scale]);
+  assert.deepEqual([...surface.geometry.getAttribute("position").array], [...triangle.positions]);
+  assert.deepEqual(seen, values);
+});
+
+test("vtk.js gets absolute numbers in double precision", async () => {
+  const given = {};
+  const put = (name) => ({ setData: (array) => (given[name] = array) });
+  const data = { getScalars: () => put("values"), getNormals: () => put("normals") };
+  const polyData = { getPoints: () => put("points"), getPolys: () => put("cells"), getPointData: () => data, modified() {} };
+  const vtk = { vtkPolyData: { newInstance: () => polyData }, vtkDataArray: { newInstance: () => ({}) } };
+  const volume = { isosurface: async () => ({ ...triangle, ...FAR }) };
+  await createVtkSurface(/** @type {any} */ (volume), { isosurface: 1 }, { vtk });
+  assert.deepEqual([...given.points], places);
+  assert.deepEqual([...given.values], values);
+  assert.equal(given.normals, triangle.normals);
+});
