@@ -286,7 +286,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let result = match way {
         Way::Whole => build(arguments, &config, mesh)?,
         Way::Parts(count) => {
-            let whole = parts::Whole::Mesh(mesh);
+            let whole = parts::Whole::Mesh(Box::new(mesh));
             let side_by_side = rayon::current_num_threads().min(count as usize);
             let metadata = options.metadata(&config);
             let parting = parts::Parting { whole, config: &config, count, metadata, side_by_side };

@@ -62,8 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // Conversions keep the numbers of the vertices.
     let exact = opened.session.exact_tables()?;
     let metadata = opened.session.metadata().iter().cloned().collect();
-    let options =
-        EncodeOptions { check_margins: true, exact, histograms: true, metadata, ..EncodeOptions::default() };
+    let options = EncodeOptions { check_margins: true, exact, histograms: true, metadata };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let info = mt.info();
     let report = Report {

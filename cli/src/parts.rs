@@ -341,7 +341,7 @@ const PER_NODE: u64 = 1000;
 
 /// What is parted.
 pub enum Whole<'a> {
-    Mesh(TetMesh),
+    Mesh(Box<TetMesh>),
     Pieces(InPieces<'a>),
 }
 

@@ -76,7 +76,7 @@ impl Painter {
         let range = [low - 0.8 * (high - low), high].map(f64::from);
         let cells = CellStyle::default();
         let style = Style { colouring: Colouring::Scale(ColourScale::new(VIRIDIS, range)?), ..cells.style };
-        let cut = ClipPlane { normal: [0.0, -1.0, 0.0], offset: -middle as f64 };
+        let cut = ClipPlane { normal: [0.0, -1.0, 0.0], offset: -middle };
         self.renderer.set_cells(Some(&CellStyle { style, cut, ..cells }));
         self.renderer.update_mesh(&view, None)?;
         self.picture(shown, pair, 0.97, path)

@@ -36,7 +36,7 @@ impl Shown {
         let field = info.fields.first().context("an MT has a field")?;
         let value = |slot: usize| field.value(mesh.levels(slot as u32)[0]);
         Ok(Self {
-            positions: mesh.positions().iter().map(|&q| info.lattice.point(q).map(|x| x as f64)).collect(),
+            positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),
             values: (0..mesh.positions().len()).map(value).collect(),
             tets: mesh.tets().to_vec(),
             neighbors: mesh.neighbors().to_vec(),

@@ -81,7 +81,7 @@ pub enum Volume {
     /// Values on a grid, not yet made.
     Grid(LayeredGrid),
     /// Tetrahedra.
-    Mesh(TetMesh),
+    Mesh(Box<TetMesh>),
 }
 
 impl Volume {
@@ -91,7 +91,7 @@ impl Volume {
     /// If a grid has more points than a mesh can number.
     pub fn into_mesh(self) -> Result<TetMesh, GenerateError> {
         match self {
-            Self::Mesh(mesh) => Ok(mesh),
+            Self::Mesh(mesh) => Ok(*mesh),
             Self::Grid(grid) if u32::try_from(grid.points()).is_ok() => Ok(grid.to_mesh()),
             Self::Grid(grid) => Err(GenerateError::Points { points: grid.points() }),
         }
@@ -107,7 +107,7 @@ pub fn volume(name: &str, size: u32, options: &Options) -> Result<Volume, Genera
         return Err(GenerateError::UnknownName(name.to_owned()));
     };
     if name == "sphere-flow" {
-        return sphere_flow(size).map(Volume::Mesh);
+        return sphere_flow(size).map(|mesh| Volume::Mesh(Box::new(mesh)));
     }
     check_size(name, size, GRID_SIZES)?;
     Ok(Volume::Grid(match name {

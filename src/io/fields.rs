@@ -320,9 +320,8 @@ mod tests {
         components: usize,
         values: Vec<f64>,
     ) -> Result<(), ReadReason> {
-        match to.claim(name, components)? {
-            Some(claim) => to.fill(claim, values, true, "m"),
-            None => {}
+        if let Some(claim) = to.claim(name, components)? {
+            to.fill(claim, values, true, "m");
         }
         Ok(())
     }

@@ -216,7 +216,7 @@ pub(super) fn expect_values(
 pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
     let place = || "<ImageData>".to_owned();
     let (placement, _) = read_placement(document).at(place)?;
-    Ok(Survey::of_placement("vti", &placement, vtu::names(document)?).at(place)?)
+    Survey::of_placement("vti", &placement, vtu::names(document)?).at(place)
 }
 
 /// The first and last cube along each axis of a box of points.

@@ -328,7 +328,7 @@ mod tests {
         let words = |low: &str, high: &str| Some([low.to_owned(), high.to_owned()]);
         assert_eq!(ends(0.0, 10.0), words("0", "10"));
         assert_eq!(ends(-1.0 / 3.0, 0.65), words("-0.333", "0.650"));
-        assert_eq!(ends(5_800_123.4567, 5_800_158.4567), words("5800123.5", "5800158.5"));
+        assert_eq!(ends(5_800_123.456_7, 5_800_158.456_7), words("5800123.5", "5800158.5"));
         assert_eq!(ends(1.7e9, 1.7e9 + 3.0), words("1700000000", "1700000003"));
         assert_eq!(ends(101_325.0, 101_325.000_1), words("101325.0000", "101325.0001"));
         assert_eq!(ends(-1e-9, 1.0), words("0", "1"));

@@ -62,7 +62,7 @@ fn torn(random: &mut Random, cells: [u32; 3], diagonals: Diagonals, [holes, shar
     }
     for at in (0..cells.iter().product::<u32>()).map(|i| place(i, cells)) {
         let from = match diagonals {
-            Diagonals::Glued => at[0] % 2 | at[1] % 2 << 1 | at[2] % 2 << 2,
+            Diagonals::Glued => (at[0] % 2) | ((at[1] % 2) << 1) | ((at[2] % 2) << 2),
             Diagonals::Own => random.below(8) as u32,
         };
         if random.once_in(holes) {

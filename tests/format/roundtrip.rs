@@ -102,7 +102,7 @@ fn what_could_not_be_read_back_is_not_written() {
     assert!(matches!(encoded(&miscounted, &plain), Err(EncodeError::Base(_))));
 
     let spelled = spelled(1, 5);
-    let spelled_in = |bits| Mt::from(spelled.clone()).in_pages(bits).expect("a complete MT");
+    let spelled_in = |bits| spelled.clone().in_pages(bits).expect("a complete MT");
     let other = MtInfo { updates: 0, ..spelled.info().clone() };
     let other = ExplicitMt::new(other, MultiTessellation::base(&spelled).clone());
     assert!(matches!(encoded(&other, &plain), Err(EncodeError::Base(_))));

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use tetralod::geom::{Bounds, Camera, Projection, ViewPreset};
 use tetralod::mesh::{TetMesh, repair};
-use tetralod::mt::{ApplyUpdates, MultiTessellation};
+use tetralod::mt::ApplyUpdates;
 use tetralod::refine::{Front, LodCriterion, Need, Request, View};
 use tetralod::{generate, io};
 

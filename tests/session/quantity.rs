@@ -74,7 +74,7 @@ fn sizes_are_longest_edges_and_errors_are_within_the_request() {
                 assert!((size - longest).abs() < 1e-5, "{kind:?}: {size} {longest}");
             }
             let errors = of(&mut session, TetQuantity::Error);
-            assert!(errors.iter().all(|e| f64::from(*e) <= error), "{kind:?} within {error}");
+            assert!(errors.iter().all(|e| *e <= error), "{kind:?} within {error}");
             let most = errors.iter().copied().fold(0.0, f64::max);
             assert!(most <= largest, "{kind:?}");
             largest = most;
@@ -208,7 +208,7 @@ fn a_reading_tells_all_fields() {
     assert_eq!((reading.position, reading.values.len(), reading.error), (p, 2, 0.0));
     assert!((reading.values[1] - linear(p)).abs() < 0.01, "{reading:?}");
     assert!((reading.values[0] - hilly(p)).abs() < 0.1, "{reading:?}");
-    assert_eq!(reading.size as f64, sizes[reading.tet as usize]);
+    assert_eq!(reading.size, sizes[reading.tet as usize]);
     assert_eq!(session.reading([2.0; 3]), Ok(None));
     assert_eq!(session.reading([f64::NAN; 3]), Ok(None));
 }

@@ -38,7 +38,7 @@ fn faces(scene: &Scene, shrunk: f64, own: Option<&[f64]>) -> Vec<Triangle> {
     let of = |(t, tet): (usize, &[u32; 4])| {
         let corners = tet.map(|p| twin::vec(scene.positions[p as usize]));
         let centroid = corners.iter().sum::<DVec3>() / 4.0;
-        let values = tet.map(|p| f64::from(own.map_or(scene.field[p as usize], |own| own[t])));
+        let values = tet.map(|p| own.map_or(scene.field[p as usize], |own| own[t]));
         FACES.map(|face| {
             let at = face.map(|i| corners[i].lerp(centroid, shrunk));
             Triangle::new(at, [DVec3::ZERO; 3], face.map(|i| values[i]))
@@ -123,7 +123,7 @@ fn cut_tetrahedra_are_those_of_the_cutaway() {
         let triangles: Vec<_> = corners
             .map(|(p, v)| {
                 let corners = [0, 1, 2].map(|i| twin::vec(p[i]));
-                Triangle::new(corners, [DVec3::ZERO; 3], [0, 1, 2].map(|i| f64::from(v[i])))
+                Triangle::new(corners, [DVec3::ZERO; 3], [0, 1, 2].map(|i| v[i]))
             })
             .collect();
         let style = CellStyle { cut, ..solid(0.0) };
@@ -213,7 +213,7 @@ fn points_are_discs_at_the_points() {
             if is_inside && !(0..at.len()).any(hides) {
                 nearest += 1;
                 let pixel = pixels[middle.y as usize * SIZE[0] as usize + middle.x as usize];
-                let colour = twin::vec(scale.colour(f64::from(scene.field[p]))).map(twin::decode);
+                let colour = twin::vec(scale.colour(scene.field[p])).map(twin::decode);
                 let bright = (1.2 * colour).map(twin::encode);
                 assert!((DVec3::from(pixel) - bright).abs().max_element() < 0.06, "point {p}: {pixel:?}");
             }

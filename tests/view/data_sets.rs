@@ -103,7 +103,7 @@ fn gpu_matches_cpu_on_data_sets() {
         let positions: Vec<[f64; 3]> = mesh.positions.clone();
         let field: Vec<f64> = mesh.fields[0].values.clone();
         let range = field.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-            [low.min(f64::from(*value)), high.max(f64::from(*value))]
+            [low.min(*value), high.max(*value)]
         });
         let bounds = positions.iter().fold(Bounds::EMPTY, |b, p| b.with(p.map(f64::from)));
         let around = neighbors(&mesh.tets).expect("a repaired mesh");

@@ -55,7 +55,7 @@ fn points_outside_are_compared_with_the_nearest() {
     assert_eq!(difference.outside, a.positions.iter().filter(|p| p[2] > 1.0).count());
     for ((p, own), value) in a.positions.iter().zip(&a.field).zip(&difference.values) {
         let nearest = [p[0], p[1], p[2].min(1.0)].map(f64::from);
-        assert!((f64::from(own - value) - linear(nearest)).abs() < 1e-4, "{p:?}");
+        assert!((own - value - linear(nearest)).abs() < 1e-4, "{p:?}");
     }
     let stats = FieldStats::of(&MeshView { field: &difference.values, ..a.view() });
     assert!(difference.root_mean_square >= stats.mean().abs());

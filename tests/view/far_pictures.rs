@@ -93,8 +93,11 @@ fn states(frame: &Frame) -> Vec<(&'static str, SceneState)> {
     ]
 }
 
+/// A picture, with the name of what it shows.
+type Picture = (&'static str, Vec<[f64; 3]>);
+
 /// The picture of each state.
-fn pictures(frame: &Frame) -> Option<Vec<(&'static str, Vec<[f64; 3]>)>> {
+fn pictures(frame: &Frame) -> Option<Vec<Picture>> {
     let mut mesh = frame.of(&cube(5, &[hilly]));
     let flow: [fn([f64; 3]) -> f64; 3] = [|p| 0.5 - p[1], |p| p[0] - 0.5, |_| 0.1];
     let unit = cube(5, &[hilly]);

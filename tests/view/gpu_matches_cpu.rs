@@ -101,7 +101,7 @@ fn the_cutaway_matches_the_ray_caster() {
         .zip(cutaway.values.chunks_exact(3))
         .map(|(p, v)| {
             let corners = [vec(p[0]), vec(p[1]), vec(p[2])];
-            Triangle::new(corners, [DVec3::ZERO; 3], [0, 1, 2].map(|i| f64::from(v[i])))
+            Triangle::new(corners, [DVec3::ZERO; 3], [0, 1, 2].map(|i| v[i]))
         })
         .collect();
     let lights = Lights::of(&camera);

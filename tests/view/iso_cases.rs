@@ -15,7 +15,7 @@ fn extract(scene: &Scene, value: f64) -> IsoSurface {
 }
 
 fn sub(a: Point, b: Point) -> [f64; 3] {
-    [0, 1, 2].map(|i| f64::from(a[i]) - f64::from(b[i]))
+    [0, 1, 2].map(|i| a[i] - b[i])
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -56,7 +56,7 @@ fn all_patterns_of_signs_give_the_right_triangles() {
         let expected = if below == 0 || corners < 3 { 0 } else { corners - 2 };
         assert_eq!(surface.indices.len(), expected, "pattern {field:?}");
         // The field is linear: f = a + gradient · p, and its gradient is known from the corners.
-        let gradient = [1, 2, 3].map(|i| f64::from(field[i] - field[0]));
+        let gradient = [1, 2, 3].map(|i| field[i] - field[0]);
         for triangle in &surface.indices {
             let normal = area(triangle.map(|v| surface.positions[v as usize]));
             assert!(
@@ -66,7 +66,7 @@ fn all_patterns_of_signs_give_the_right_triangles() {
         }
         for v in surface.indices.iter().flatten() {
             let (p, n) = (surface.positions[*v as usize], surface.normals[*v as usize].map(f64::from));
-            let value = f64::from(field[0]) + dot(gradient, p.map(f64::from));
+            let value = field[0] + dot(gradient, p.map(f64::from));
             assert!(value.abs() < 1e-6, "pattern {field:?}: vertex {p:?} has value {value}");
             assert!(
                 (dot(n, gradient) + dot(gradient, gradient).sqrt()).abs() < 1e-5,
@@ -186,7 +186,7 @@ fn equals_the_plain_version() {
         (Scene::cube(7, move |p| wavy(p).round()), 1.0),
         (Scene::cube(6, |p| (p[0] * 6.0).round()), 3.0),
     ] {
-        let surface = extract(&scene, f64::from(iso));
+        let surface = extract(&scene, iso);
         // Name every vertex by the edge it lies on, found anew from its position.
         let mut names = BTreeMap::new();
         let mut edges = BTreeSet::new();
@@ -196,12 +196,11 @@ fn equals_the_plain_version() {
             }
         }
         for [a, b] in edges {
-            let [fa, fb] = [a, b].map(|p| f64::from(scene.field[p as usize]));
-            let iso = f64::from(iso);
+            let [fa, fb] = [a, b].map(|p| scene.field[p as usize]);
             if fa < iso && iso <= fb {
                 let [p, q] = [a, b].map(|p| scene.positions[p as usize].map(f64::from));
                 let t = (iso - fa) / (fb - fa);
-                let at = [0, 1, 2].map(|i| ((p[i] + t * (q[i] - p[i])) as f64).to_bits());
+                let at = [0, 1, 2].map(|i| (p[i] + t * (q[i] - p[i])).to_bits());
                 names.insert(at, if fb == iso { [b, b] } else { [a, b] });
             }
         }

@@ -245,7 +245,7 @@ fn several_isovalues_are_the_union_of_single_ones() {
             let mut single = IsoSurface::new();
             single.set_normal_kind(kind);
             single.extract(&scene.view(), value);
-            assert!(single.values.iter().all(|v| *v == value as f64));
+            assert!(single.values.iter().all(|v| *v == value));
             singles.extend(triangles(&single));
         }
         singles.sort_unstable();

@@ -96,7 +96,7 @@ impl<'a> Mixed<'a> {
     }
 
     fn is_cut(&self, mask: u32, p: DVec3) -> bool {
-        let cuts = |plane: &ClipPlane| twin::vec(plane.normal).dot(p) > f64::from(plane.offset);
+        let cuts = |plane: &ClipPlane| twin::vec(plane.normal).dot(p) > plane.offset;
         self.look.clips.iter().enumerate().any(|(i, plane)| mask >> i & 1 == 1 && cuts(plane))
     }
 
@@ -121,7 +121,7 @@ impl<'a> Mixed<'a> {
         let Some((medium, mask)) = self.medium else { return Light::NONE };
         for (i, plane) in self.look.clips.iter().enumerate().filter(|(i, _)| mask >> i & 1 == 1) {
             let normal = twin::vec(plane.normal);
-            let height = f64::from(plane.offset) - normal.dot(ray.origin);
+            let height = plane.offset - normal.dot(ray.origin);
             let slope = normal.dot(ray.direction);
             assert!(slope != 0.0, "plane {i} is seen from its edge");
             let limit = height / slope;

@@ -40,9 +40,8 @@ fn random_corner(random: &mut Random, cells: f64) -> [f64; 3] {
 /// The place of a point by asking all tetrahedra in turn, inexactly.
 fn holds(mesh: &MeshView<'_>, place: &Place, p: [f64; 3]) -> bool {
     let tet = mesh.tets[place.tet as usize];
-    let at = [0, 1, 2].map(|i| {
-        (0..4).map(|k| place.weights[k] * f64::from(mesh.positions[tet[k] as usize][i])).sum::<f64>()
-    });
+    let at =
+        [0, 1, 2].map(|i| (0..4).map(|k| place.weights[k] * mesh.positions[tet[k] as usize][i]).sum::<f64>());
     place.weights.iter().all(|w| *w >= 0.0)
         && (place.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12
         && (0..3).all(|i| (at[i] - p[i]).abs() < 1e-9)
@@ -204,7 +203,7 @@ fn lines_have_gaps_where_they_are_outside() {
 
 /// The components of a vector field at the points.
 fn vectors(scene: &Scene, f: impl Fn([f64; 3]) -> [f64; 3]) -> [Vec<f64>; 3] {
-    [0, 1, 2].map(|i| scene.positions.iter().map(|p| f(p.map(f64::from))[i] as f64).collect())
+    [0, 1, 2].map(|i| scene.positions.iter().map(|p| f(p.map(f64::from))[i]).collect())
 }
 
 #[test]

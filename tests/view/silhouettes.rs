@@ -89,7 +89,7 @@ fn each_side_of_an_open_surface_has_its_colour() {
             let field = whole.field.iter().map(|x| sign * x).collect();
             let scene = Scene::new(whole.positions.clone(), field, tets.clone());
             let mut surface = IsoSurface::new();
-            surface.extract(&scene.view(), f64::from(sign) * value);
+            surface.extract(&scene.view(), sign * value);
             let triangles = Triangle::all(&Triangles::from(&surface));
             renderer.set_surface(0, &Triangles::from(&surface), None).unwrap();
             sides(&mut renderer, RED, GREEN);

@@ -312,7 +312,7 @@ fn the_boundary_is_closed_and_has_the_area_of_the_box() {
             .indices
             .iter()
             .map(|t| t.map(|v| surface.positions[v as usize]))
-            .map(|t| (0..3).map(|i| doubled(t)[i] * f64::from(t[0][i])).sum::<f64>() / 6.0)
+            .map(|t| (0..3).map(|i| doubled(t)[i] * t[0][i]).sum::<f64>() / 6.0)
             .sum();
         assert!((volume - 1.0).abs() < 1e-6);
     }

@@ -191,7 +191,7 @@ fn scene() -> Scene {
 fn reach(solids: &Solids, arrow: usize, arrows: usize) -> f64 {
     let each = solids.positions.len() / arrows;
     let points = &solids.positions[arrow * each..(arrow + 1) * each];
-    let ends = points.iter().map(|p| f64::from(p[2]));
+    let ends = points.iter().map(|p| p[2]);
     ends.clone().fold(f64::NEG_INFINITY, f64::max) - ends.fold(f64::INFINITY, f64::min)
 }
 
@@ -213,14 +213,12 @@ fn arrows_are_closed_and_as_long_as_their_vectors() {
         let largest = solids.values.iter().copied().fold(0.0, f64::max);
         let each = solids.positions.len() / arrows;
         for arrow in 0..arrows {
-            let part = f64::from(solids.values[arrow * each] / largest);
+            let part = solids.values[arrow * each] / largest;
             assert!((reach(&solids, arrow, arrows) - 0.2 * part).abs() < 1e-6);
             // The tip is where the vector leads.
             let tip = solids.positions[(arrow + 1) * each - 1].map(f64::from);
             let place = Probe::new(view).locate(sub(tip, [0.0, 0.0, 0.1 * part])).expect("inside");
-            assert!(
-                (place.interpolate(&view, &along_z) - f64::from(solids.values[arrow * each])).abs() < 1e-5
-            );
+            assert!((place.interpolate(&view, &along_z) - solids.values[arrow * each]).abs() < 1e-5);
         }
     }
     let mut solids = Solids::new();

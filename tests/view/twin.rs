@@ -74,7 +74,7 @@ impl Triangle {
         let one = |t: &[u32; 3]| {
             let corners = t.map(|v| vec(triangles.positions[v as usize]));
             let normals = t.map(|v| triangles.normals.get(v as usize).map_or(DVec3::ZERO, |n| vec(*n)));
-            let values = t.map(|v| triangles.values.get(v as usize).map_or(0.0, |x| f64::from(*x)));
+            let values = t.map(|v| triangles.values.get(v as usize).map_or(0.0, |x| *x));
             Self::new(corners, normals, values)
         };
         triangles.indices.iter().map(one).collect()

@@ -13,16 +13,14 @@ pub fn write(out: &mut Vec<u8>, [low, high]: [[i32; 3]; 2]) {
 
 /// Reads a box on a lattice with so many bits, 1 to 30.
 pub fn read(mut reader: Reader<'_>, bits: u32) -> Result<[[i32; 3]; 2], FormatError> {
-    let mut bounds = [[0; 3]; 2];
-    for axis in 0..3 {
+    let [mut least, mut largest] = [[0; 3]; 2];
+    for (least, largest) in least.iter_mut().zip(&mut largest) {
         let [low, more] = [reader.varint()?, reader.varint()?];
         match low.checked_add(more) {
-            Some(high) if high <= 1 << bits => {
-                (bounds[0][axis], bounds[1][axis]) = (low as i32, high as i32);
-            }
+            Some(high) if high <= 1 << bits => (*least, *largest) = (low as i32, high as i32),
             _ => return Err(reader.corrupt("the box of the reference mesh is not on the lattice")),
         }
     }
     reader.end()?;
-    Ok(bounds)
+    Ok([least, largest])
 }

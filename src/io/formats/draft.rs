@@ -78,9 +78,8 @@ impl<'a> Draft<'a> {
         integer: bool,
         read: impl FnOnce() -> Result<Vec<f64>, ReadReason>,
     ) -> Result<(), ReadReason> {
-        match self.fields.claim(name, components)? {
-            Some(claim) => self.fields.fill(claim, read()?, integer, ""),
-            None => {}
+        if let Some(claim) = self.fields.claim(name, components)? {
+            self.fields.fill(claim, read()?, integer, "");
         }
         Ok(())
     }

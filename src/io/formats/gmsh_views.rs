@@ -94,7 +94,7 @@ pub(super) fn read_rows(file: &mut Scanner<'_>, layout: Layout, head: Head) -> R
             (file.number()?, if head.at == At::ElementNodes { file.number()? } else { 1 })
         };
         let nodes = usize::try_from(nodes).map_err(|_| ReadReason::Syntax(format!("{nodes} nodes")))?;
-        let count = nodes.checked_mul(head.components).unwrap_or(usize::MAX);
+        let count = nodes.saturating_mul(head.components);
         let row = if layout.binary {
             file.floats(count, NumberType::F64, layout.big)?
         } else {
@@ -141,7 +141,9 @@ pub(super) struct Steps {
 impl Steps {
     /// Those of views with these heads. Where one has several steps without times that differ, their numbers are the times.
     pub fn of(heads: &[Head]) -> Self {
-        let mut steps: BTreeMap<(At, String), Vec<(i64, Option<f64>)>> = BTreeMap::new();
+        // Of each view the numbers of its steps, with their times.
+        type OfView = Vec<(i64, Option<f64>)>;
+        let mut steps: BTreeMap<(At, String), OfView> = BTreeMap::new();
         for head in heads {
             let of_view = steps.entry((head.at, head.name.clone())).or_default();
             // Partitions of a view are of one step, as are other views of the same name.
@@ -149,7 +151,7 @@ impl Steps {
                 of_view.push((head.step, head.time));
             }
         }
-        let same_time = |of_view: &Vec<(i64, Option<f64>)>| {
+        let same_time = |of_view: &OfView| {
             let has_twice =
                 |(i, step): (usize, &(i64, Option<f64>))| of_view[..i].iter().any(|other| other.1 == step.1);
             of_view.iter().enumerate().any(has_twice)
@@ -205,7 +207,8 @@ pub(super) struct Means {
 pub(super) fn means(view: &View, nodes: &HashMap<i64, Vec<i64>>) -> Means {
     let components = view.head.components;
     // Sums, least and greatest values, and how many.
-    let mut sums: HashMap<i64, (Vec<f64>, Vec<[f64; 2]>, usize)> = HashMap::new();
+    type OfNode = (Vec<f64>, Vec<[f64; 2]>, usize);
+    let mut sums: HashMap<i64, OfNode> = HashMap::new();
     // In the order of tags: sums must not depend on that of a table.
     let mut tags: Vec<&i64> = view.rows.keys().collect();
     tags.sort_unstable();

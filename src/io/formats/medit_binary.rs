@@ -135,7 +135,7 @@ impl Section<'_> {
             return parts.solution(*of, arrays);
         }
         if let Some((order, width)) = ordering(|(_, known)| known == number) {
-            let count = self.count()?.checked_mul(width).unwrap_or(usize::MAX);
+            let count = self.count()?.saturating_mul(width);
             let table = self.data.integers(count, NumberType::I32, self.layout.big)?;
             parts.cells.orders.insert(order, table);
             return Ok(());

@@ -34,7 +34,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
         // What is skipped of the file itself is counted from its beginning.
         samples(if header.skipped > 0 { bytes } else { rest }, expected).at(|| "samples".into())?
     } else {
-        from_files(("ElementDataFile", &names), expected, beside, &samples)?
+        from_files(("ElementDataFile", &names), expected, beside, samples)?
     };
     volume.mesh(&samples, options).at(|| "samples".into())
 }

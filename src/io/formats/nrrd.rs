@@ -54,7 +54,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
     let samples = if header.files.is_empty() {
         samples(data, expected).at(|| "samples".into())?
     } else {
-        from_files(("data file", &header.files), expected, beside, &samples)?
+        from_files(("data file", &header.files), expected, beside, samples)?
     };
     volume.mesh(&samples, options).at(|| "samples".into())
 }

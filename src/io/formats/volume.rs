@@ -185,7 +185,7 @@ pub(super) fn from_files(
     (key, names): (&str, &[String]),
     expected: usize,
     beside: Beside<'_>,
-    read: &dyn Fn(&[u8], usize) -> Result<Vec<u8>, ReadReason>,
+    read: impl Fn(&[u8], usize) -> Result<Vec<u8>, ReadReason>,
 ) -> Result<Vec<u8>, ReadError> {
     let part = expected.checked_div(names.len()).filter(|part| part * names.len() == expected);
     let uneven = || ReadReason::Syntax(format!("{expected} bytes of samples in {} files", names.len()));
