@@ -45,6 +45,10 @@ class VtkSurface {
     this.dispose();
   }
 
+  /**
+   * @param {{ indices: Uint32Array, normals?: Float32Array, positions: Float32Array, values?: Float32Array, origin: number[],
+   *   offset: number, scale: number }} triangles
+   */
   #take({ indices, normals, ...stored }) {
     const { polyData } = this;
     const { positions, values } = absolute(stored);

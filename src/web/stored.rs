@@ -32,12 +32,14 @@ impl Stored {
     }
 
     /// The same as five numbers, for another module.
+    #[cfg(feature = "web-session")]
     pub fn numbers(&self) -> Vec<f64> {
         let [x, y, z] = self.points.origin;
         vec![x, y, z, self.values.offset, self.values.unit]
     }
 
     /// What [`Self::numbers`] gave.
+    #[cfg(feature = "web-tools")]
     pub fn from_numbers(numbers: &[f64]) -> Self {
         let &[x, y, z, offset, unit] = numbers else { return Self::default() };
         Self { points: SinglePoints { origin: [x, y, z], unit: 1.0 }, values: SingleValues { offset, unit } }

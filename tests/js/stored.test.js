@@ -3,8 +3,10 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { applyChanges, emptyMesh } from "../../pkg-template/changes.js";
 import { absolute } from "../../pkg-template/surfaces.js";
-import { createSurface as createThreeSurface } from "../../pkg-template/three.js";
-import { createSurface as createVtkSurface } from "../../pkg-template/vtk.js";
+
+// By their addresses: the declarations beside them name types of libraries that are not here.
+const adapter = (name) => import(new URL(`../../pkg-template/${name}.js`, import.meta.url).href);
+const [{ createSurface: createThreeSurface }, { createSurface: createVtkSurface }] = await Promise.all(["three", "vtk"].map(adapter));
 
 const FAR = { origin: [600_000, 5_800_000.25, 0], offset: 1.7e9, scale: 2 };
 const NEAR = { origin: [0, 0, 0], offset: 0, scale: 1 };

@@ -108,7 +108,7 @@ fn ball(radius: f64, parts: u32) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let at = |i: u32, j: u32| {
         let (around, up) =
             (TAU * f64::from(i % (2 * parts)) / f64::from(2 * parts), PI * f64::from(j) / f64::from(parts));
-        [up.sin() * around.cos(), up.sin() * around.sin(), -up.cos()].map(|x| (0.5 + radius * x))
+        [up.sin() * around.cos(), up.sin() * around.sin(), -up.cos()].map(|x| 0.5 + radius * x)
     };
     let places = (0..2 * parts).flat_map(|i| (0..parts).map(move |j| (i, j)));
     let corners = places.map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);

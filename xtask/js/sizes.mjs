@@ -23,15 +23,15 @@ const LIMITS = {
   "./three": 2_500,
   "./vtk": 2_500,
   "./build": 4_000,
-  "./inline": 365_000,
+  "./inline": 400_000,
   "./worker": 10_300,
   "./viewer-worker": 19_500,
   "./build-worker": 5_500,
-  "./core.wasm": 148_000,
-  "./all-kinds.wasm": 216_000,
-  "./tools.wasm": 56_000,
-  "./viewer.wasm": 409_000,
-  "./build.wasm": 530_000,
+  "./core.wasm": 170_000,
+  "./all-kinds.wasm": 242_000,
+  "./tools.wasm": 61_000,
+  "./viewer.wasm": 450_000,
+  "./build.wasm": 575_000,
 };
 
 const folder = resolve(process.argv[2]);
