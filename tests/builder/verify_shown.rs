@@ -69,6 +69,6 @@ fn values_with_a_large_offset() {
 #[test]
 fn values_beyond_single_precision() {
     both("very large", &valued(cube(), |x| 1e40 * (x + 1.0)));
-    both("very small", &valued(cube(), |x| 1e-50 * x));
-    both("both signs", &valued(cube(), |x| 1e300 * (x - 0.5)));
+    both("very small", &valued(cube(), |x| 1e-45 * x));
+    both("both signs", &valued(cube(), |x| 1e50 * (x - 0.5)));
 }

@@ -362,7 +362,8 @@ pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
     end.extend(crc32(&[&crcs]).to_le_bytes());
     let body = [framed.concat(), section(b"ENDF", &end)].concat();
     let of_half_edges = sections.iter().any(|(kind, payload)| kind == b"INFO" && payload.first() == Some(&3));
-    let has_histograms = sections.iter().any(|(kind, _)| kind == b"hist");
-    let version = [if of_half_edges { 3 } else { 2 }, u16::from(has_histograms)];
+    let has = |name: &[u8; 4]| sections.iter().any(|(kind, _)| kind == name);
+    let minor = if has(b"bbox") { 2 } else { u16::from(has(b"hist")) };
+    let version = [if of_half_edges { 3 } else { 2 }, minor];
     [header(version, 0, 32 + body.len() as u64), body].concat()
 }

@@ -65,7 +65,8 @@ fn states(frame: &Frame) -> Vec<(&'static str, SceneState)> {
             "cells",
             SceneState {
                 cells: Some(CellState {
-                    cut: Some(through([0.55; 3], [1.0, 0.0, 0.0])),
+                    // Through the centre of no cell.
+                    cut: Some(through([0.53; 3], [1.0, 0.0, 0.0])),
                     shrink: 0.2,
                     ..CellState::default()
                 }),
