@@ -50,6 +50,19 @@ const LAYERS_24: [[u8; 8]; 3] =
 /// The middles of the faces of a pyramid of 19 points, in the order of the faces, and of the whole.
 const MIDDLES_19: [u8; 5] = [13, 14, 15, 16, 17];
 const MIDDLE_OF_19: u8 = 18;
+/// The corners around the middles of the faces of a hexahedron of 27 points, and of the whole.
+const MIDDLES_27: &[&[u8]] = &[
+    &[0, 3, 4, 7],
+    &[1, 2, 5, 6],
+    &[0, 1, 4, 5],
+    &[2, 3, 6, 7],
+    &[0, 1, 2, 3],
+    &[4, 5, 6, 7],
+    &[0, 1, 2, 3, 4, 5, 6, 7],
+];
+/// The same of a pyramid of 19 points.
+const MIDDLES_OF_19: &[&[u8]] =
+    &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4], &[0, 1, 2, 3, 4]];
 /// The triangles that such a triangle is cut into.
 const FOURTHS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 
@@ -97,6 +110,26 @@ pub(super) fn recipe(kind: i64) -> Option<Recipe> {
         }
         _ => return None,
     })
+}
+
+/// The points of a cell of the second order that are in the middle of corners, each with these corners.
+pub(super) fn middles(kind: i64) -> Vec<(u8, &'static [u8])> {
+    let (edges, rest): (&[[u8; 2]], &[&[u8]]) = match kind {
+        24 => (TETRAHEDRON_EDGES, &[]),
+        25 => (HEXAHEDRON_EDGES, &[]),
+        26 => (WEDGE_EDGES, &[]),
+        27 => (PYRAMID_EDGES, &[]),
+        29 => (HEXAHEDRON_EDGES, MIDDLES_27),
+        31 => (&WEDGE_EDGES[..6], &[]),
+        32 => (WEDGE_EDGES, &WEDGE[2..]),
+        33 => (HEXAHEDRON_EDGES, &MIDDLES_27[..4]),
+        37 => (PYRAMID_EDGES, MIDDLES_OF_19),
+        PYRAMID_14 => (PYRAMID_EDGES, &PYRAMID[..1]),
+        _ => return Vec::new(),
+    };
+    let first = edges.as_flattened().iter().max().map_or(0, |last| last + 1);
+    let corners = edges.iter().map(<[u8; 2]>::as_slice).chain(rest.iter().copied());
+    (first..).zip(corners).collect()
 }
 
 /// A part with these faces, whose points are some of the cell's.
@@ -366,6 +399,22 @@ mod tests {
         }
         let counts = KINDS.map(|kind| recipe(kind).unwrap().most_tets());
         assert_eq!(counts, [1, 6, 6, 3, 2, 9, 12, 8, 22, 15, 13, 48, 12, 24, 36, 32, 16]);
+    }
+
+    #[test]
+    fn middles_are_in_the_middle_of_their_corners() {
+        for kind in KINDS {
+            let (points, _) = cell(kind);
+            let middles = middles(kind);
+            for (point, corners) in &middles {
+                let corners: Vec<[f64; 3]> = corners.iter().map(|&p| points[usize::from(p)]).collect();
+                let (found, to) = (mean(&corners), points[usize::from(*point)]);
+                assert!((0..3).all(|i| (found[i] - to[i]).abs() < 1e-12), "{kind} {point}: {found:?} {to:?}");
+            }
+            let linear = [10, 11, 12, 13, 14, 15, 16].contains(&kind);
+            assert_eq!(middles.is_empty(), linear, "{kind}");
+            assert!(linear || usize::from(middles[middles.len() - 1].0) == points.len() - 1, "{kind}");
+        }
     }
 
     /// The triangles of the boundary, each with its vertices in ascending order.

@@ -5,10 +5,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::io::cell_shapes::{PYRAMID_14, Recipe, recipe};
+use crate::io::cell_shapes::{PYRAMID_14, Recipe, middles, recipe};
 use crate::io::error::{ReadReason, cell_name, names};
 use crate::io::vtu::{GHOST_CELL, HIDDEN_CELL};
-use crate::mesh::{CellNumbers, Field, MeshInput};
+use crate::mesh::{BitSet, CellNumbers, Field, MeshInput};
 
 /// VTK's number for no cell at all; also that of cells which are to be left out.
 pub(super) const EMPTY: i64 = 0;
@@ -123,13 +123,20 @@ pub(super) fn leave_out(types: &[i64], input: &mut MeshInput) {
     }
 }
 
-/// Recipes that were looked up.
+/// The points of a cell in the middle of corners, with these.
+type Middles = Vec<(u8, &'static [u8])>;
+
+/// Recipes that were looked up, and middles.
 #[derive(Default)]
-struct Recipes(BTreeMap<i64, Option<Recipe>>);
+struct Recipes(BTreeMap<i64, Option<(Recipe, Middles)>>);
 
 impl Recipes {
     fn of(&mut self, kind: i64) -> Option<&Recipe> {
-        self.0.entry(kind).or_insert_with(|| recipe(kind)).as_ref()
+        self.with_middles(kind).map(|(recipe, _)| recipe)
+    }
+
+    fn with_middles(&mut self, kind: i64) -> Option<&(Recipe, Middles)> {
+        self.0.entry(kind).or_insert_with(|| recipe(kind).map(|recipe| (recipe, middles(kind)))).as_ref()
     }
 }
 
@@ -320,14 +327,14 @@ fn split(
     }
     split.tets.reserve_exact(room);
     let (mut start, mut recipes) = (0, Recipes::default());
-    let mut vertices = Vec::new();
+    let (mut vertices, mut known) = (Vec::new(), BitSet::default());
     for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
         let end = usize::try_from(end).unwrap_or(usize::MAX);
         let listed = connectivity.get(start..end);
         let listed = listed.ok_or_else(|| ReadReason::Missing(format!("a point of cell {cell}")))?;
         start = end;
         let first = split.tets.len();
-        if let Some(recipe) = recipes.of(kind) {
+        if let Some((recipe, middles)) = recipes.with_middles(kind) {
             vertices.clear();
             for &point in listed {
                 vertices.push(numbering.of(cell, point)?);
@@ -335,6 +342,12 @@ fn split(
             match vertices.as_slice() {
                 &[a, b, c, d] if kind == TETRAHEDRON => split.tets.push([a, b, c, d]),
                 vertices => recipe.split(vertices, &mut split.tets),
+            }
+            for (point, corners) in middles {
+                let vertex = |p: &u8| vertices[usize::from(*p)];
+                if known.insert(vertex(point)) {
+                    split.input.middles.push(vertex(point), corners.iter().map(vertex));
+                }
             }
         }
         split.came_from(cell, first);

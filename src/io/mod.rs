@@ -72,7 +72,7 @@ pub use write_layers::write_vti_layers;
 use std::path::{Component, Path};
 
 use crate::io::error::At;
-use crate::mesh::TetMesh;
+use crate::mesh::{TetMesh, straighten};
 
 /// What to read of a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -119,9 +119,11 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     read_unexpanded(path, options).map(expanded)
 }
 
-/// The same mesh with finite numbers at points that no cell uses, and with all notes in words.
+/// The same mesh with finite numbers at points that no cell uses, without cells that fold because they were cut into straight
+/// tetrahedra, and with all notes in words.
 fn settled(mut mesh: TetMesh) -> TetMesh {
     fields::settle_unused(&mut mesh);
+    straighten(&mut mesh);
     mesh.notes.extend(mesh.input.lines());
     mesh
 }

@@ -13,7 +13,7 @@ use crate::io::pvtu::{bits, for_each_file};
 use crate::io::vtu::{PieceReader, first_number};
 use crate::io::xml::Document;
 use crate::io::{ReadOptions, in_file, load, load_beside, packed, without_mark};
-use crate::mesh::{Field, MeshPiece, TetMesh};
+use crate::mesh::{Field, MeshPiece, Middles, TetMesh};
 
 /// A mesh in several files, of which one is read at a time.
 #[derive(Clone, Debug)]
@@ -229,6 +229,8 @@ impl Seen {
         }
         self.points += numbered.new.len();
         settle_unused(&mut mesh);
+        // A piece alone cannot know which of its points others move.
+        mesh.input.middles = Middles::default();
         Ok(MeshPiece { points: numbered.numbers, mesh })
     }
 

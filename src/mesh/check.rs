@@ -86,10 +86,7 @@ pub(crate) struct Sides<'a> {
 impl<'a> Sides<'a> {
     /// Side tests over `positions`, all finite.
     pub fn new(positions: &'a [[f64; 3]]) -> Self {
-        let largest = positions.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
-        // Ordinary coordinates need no scaling; the bounds leave room for products of three differences.
-        let ordinary = largest == 0.0 || (1e-60..1e90).contains(&largest);
-        Self { positions, scale: if ordinary { 1.0 } else { power_of_two_near(largest.recip()) } }
+        Self { positions, scale: scale_of(positions) }
     }
 
     fn point(&self, v: u32) -> [f64; 3] {
@@ -98,12 +95,7 @@ impl<'a> Sides<'a> {
 
     /// 1 for a positive tetrahedron, -1 for an inverted one, 0 for a flat one.
     pub fn of(&self, tet: [u32; 4]) -> i32 {
-        let [a, b, c, d] = tet.map(|v| {
-            let [x, y, z] = self.point(v);
-            Coord3D { x, y, z }
-        });
-        // Shewchuk's sign is positive when `d` lies below `abc`, ours when it lies above.
-        sign(-robust::orient3d(a, b, c, d))
+        side_of(tet.map(|v| self.positions[v as usize]), self.scale)
     }
 
     /// For a flat tetrahedron, which side of its plane each face looks to (1 or -1); 0 for faces without area.
@@ -125,6 +117,24 @@ impl<'a> Sides<'a> {
             .find(|s| *s != [0; 4])
             .unwrap_or([0; 4])
     }
+}
+
+/// What coordinates are multiplied by for exact side tests.
+pub(super) fn scale_of(positions: &[[f64; 3]]) -> f64 {
+    let largest = positions.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+    // Ordinary coordinates need no scaling; the bounds leave room for products of three differences.
+    let ordinary = largest == 0.0 || (1e-60..1e90).contains(&largest);
+    if ordinary { 1.0 } else { power_of_two_near(largest.recip()) }
+}
+
+/// 1 for a tetrahedron that is positive with its vertices in these places, -1 for an inverted one, 0 for a flat one.
+pub(super) fn side_of(places: [[f64; 3]; 4], scale: f64) -> i32 {
+    let [a, b, c, d] = places.map(|place| {
+        let [x, y, z] = place.map(|x| x * scale);
+        Coord3D { x, y, z }
+    });
+    // Shewchuk's sign is positive when `d` lies below `abc`, ours when it lies above.
+    sign(-robust::orient3d(a, b, c, d))
 }
 
 fn sign(x: f64) -> i32 {

@@ -3,6 +3,8 @@
 use std::fmt;
 
 use crate::mesh::Field;
+#[cfg(feature = "build")]
+use crate::mesh::Middles;
 
 /// What is known of the input that a mesh was read from. A mesh that was made otherwise has none of it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,6 +17,9 @@ pub struct MeshInput {
     pub other_fields: Vec<Field>,
     /// The same of fields at cells.
     pub other_cell_fields: Vec<Field>,
+    /// The middles of its cells, until the mesh is passed on.
+    #[cfg(feature = "build")]
+    pub(crate) middles: Middles,
 }
 
 impl MeshInput {
@@ -44,6 +49,8 @@ impl MeshInput {
     /// Takes over what is known of another part of the input, whose tetrahedra follow those of this one.
     pub fn append(&mut self, part: Self) {
         self.cells.append(part.cells);
+        #[cfg(feature = "build")]
+        self.middles.append(part.middles);
         for note in part.notes {
             match note {
                 Note::LeftOut { count, one, many } => self.leave_out(count, &one, &many),
@@ -154,7 +161,7 @@ impl CellNumbers {
     }
 
     /// The number of a tetrahedron's cell, numbered on over all parts. Those that nothing is known of are their own.
-    fn number(&self, tet: u32) -> u32 {
+    pub(super) fn number(&self, tet: u32) -> u32 {
         match &self.numbers {
             Numbers::Same => tet,
             Numbers::Equal(each) => tet / each.max(&1),

@@ -13,6 +13,8 @@ mod histogram;
 mod input;
 mod kuhn;
 mod layered_grid;
+#[cfg(feature = "build")]
+mod middles;
 mod piece;
 mod repair;
 mod series;
@@ -38,6 +40,8 @@ pub(crate) use histogram::{Sum, volume_of};
 pub use input::{CellNumbers, InputCell, MeshInput, Note};
 pub use kuhn::kuhn_tets;
 pub use layered_grid::{GridArray, LayeredGrid};
+#[cfg(feature = "build")]
+pub(crate) use middles::{Middles, straighten};
 pub use piece::MeshPiece;
 pub use repair::{MeshFindings, RepairLevel, RepairReport, findings, repair, repair_at};
 pub use series::StepError;

@@ -1,6 +1,7 @@
 //! Promises of the exchange formats.
 
 mod cells;
+mod curved;
 mod damaged;
 mod encodings;
 mod fields;
