@@ -124,6 +124,7 @@ const infos: Members<MtInfo> = {
   origin: "object",
   vertices: "number",
   tetrahedra: "number",
+  exactValues: "string",
   updates: "number",
 };
 
