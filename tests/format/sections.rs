@@ -60,7 +60,7 @@ fn versions_and_flags() {
     assert!(with(header([3, 0], 0, total)).is_ok(), "version 3 has all of version 2");
     assert!(with(header([2, 0], 1 << 16, total)).is_ok(), "a hint");
     for found in [[0, 9], [1, 0], [1, 9], [4, 0]] {
-        let other = FormatError::UnsupportedVersion { found, supported: [3, 1] };
+        let other = FormatError::UnsupportedVersion { found, supported: [3, 2] };
         assert_eq!(with(header(found, 0, total)), Err(other));
     }
     let critical = with(header([2, 0], 1 << 15, total));
@@ -90,7 +90,7 @@ fn other_files_are_called_so_at_once() {
 fn every_error_says_what_to_do() {
     let errors = [
         FormatError::NotMt,
-        FormatError::UnsupportedVersion { found: [4, 0], supported: [3, 1] },
+        FormatError::UnsupportedVersion { found: [4, 0], supported: [3, 2] },
         FormatError::UnsupportedFeature { offset: 12, what: "a flag" },
         FormatError::Corrupt { offset: 99, what: "a number" },
         FormatError::Truncated { offset: 99 },

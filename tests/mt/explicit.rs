@@ -130,10 +130,13 @@ proptest! {
         let (v, t) = (built.info.vertices as usize, built.info.tetrahedra as usize);
         prop_assert_eq!(found.indexed_bytes, (v * vertex + 16 * t) as u64);
         prop_assert_eq!(found.adjacency_bytes, (v * vertex + 32 * t) as u64);
-        // Forest and numbering: 12 bytes an update; offset, field offsets, mask and error with them.
+        // Forest, numbering and mask: five words an update; with them, bit by bit, the offset, the edge that it is counted from and the
+        // field offsets; and errors.
         let (b, base_tets) = (built.base.positions.len(), built.base.tets.len());
         let errors = if fields == 1 { 2 } else { 2 * (fields + 1) };
-        let compact = b * (vertex + 4) + 16 * base_tets + n * (12 + 8 + 4 * fields + 8 + errors);
+        let bits = 3 * (built.info.lattice.bits + 2) + 7 + built.info.fields.iter().map(|f| f.bits + 3).sum::<u32>();
+        let words = 5 + bits.div_ceil(32) as usize;
+        let compact = b * (vertex + 4) + 16 * base_tets + n * (4 * words + errors);
         // And an entry for each page, of 1024 updates at most.
         let pages = mt.bytes() - compact as u64;
         prop_assert!(pages <= 64 * n.div_ceil(1024) as u64, "{pages}");

@@ -201,7 +201,7 @@ fn a_paged_mt_is_the_one_that_was_pushed() {
         let mut paged = Paged::new(subject, 10);
         let mut front = Front::new(&paged.mt).expect("a valid base mesh");
         (0..paged.pages()).for_each(|page| paged.insert(&mut front, page));
-        assert_eq!(paged.mt, subject.mt);
+        assert_eq!(paged.mt, subject.mt.in_pages(10).expect("a complete MT"));
     }
 }
 

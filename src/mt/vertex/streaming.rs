@@ -171,6 +171,7 @@ impl VertexMt {
         let most_children = growing.children.iter().map(Vec::len).max().unwrap_or(0) as u32;
         let (base, removers) = (std::mem::take(&mut self.base), std::mem::take(&mut self.base_removers));
         let mut packed = Self::new(self.info.clone(), base, removers, most_children, self.always_grows)?;
+        packed.page_bits = self.page_bits;
         packed.base_quarterings = self.base_quarterings.take();
         let mut node = NodeBits::default();
         for u in 0..self.updates() {
