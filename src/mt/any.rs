@@ -26,7 +26,7 @@ impl Mt {
         self.info().kind.is_paged()
     }
 
-    /// Finds the box around the reference mesh ([`MtInfo::bounds`]) if it is not known, by applying all updates once.
+    /// Finds the box around the reference mesh ([`MtInfo::bounds`](super::MtInfo::bounds)) if it is not known, by applying all updates once.
     ///
     /// # Errors
     /// If one cannot be applied.
