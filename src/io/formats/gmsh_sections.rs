@@ -56,6 +56,23 @@ impl Numbers<'_, '_> {
         }
     }
 
+    /// The number of entities of each dimension, points first.
+    fn entities(&mut self) -> Result<[usize; 4], ReadReason> {
+        Ok([self.count()?, self.count()?, self.count()?, self.count()?])
+    }
+
+    /// The rest of an entity behind its tag: its place of so many numbers, its physical group, which is returned, and its boundary.
+    fn rest_of_entity(&mut self, dimension: usize, place: usize) -> Result<Option<i64>, ReadReason> {
+        for _ in 0..place {
+            self.float()?;
+        }
+        let group = self.first_tag()?;
+        if dimension > 0 {
+            self.first_tag()?;
+        }
+        Ok(group)
+    }
+
     /// The first tag of a list, if it has one. Where the sign says how an entity is turned, it is left out.
     fn first_tag(&mut self) -> Result<Option<i64>, ReadReason> {
         let mut first = None;
@@ -81,22 +98,12 @@ pub(super) fn read_entities(
 ) -> Result<(), ReadReason> {
     let mut numbers = Numbers { file, layout };
     numbers.end_line();
-    let mut counts = [0; 4];
-    for count in &mut counts {
-        *count = numbers.count()?;
-    }
-    for (dimension, count) in counts.into_iter().enumerate() {
+    for (dimension, count) in numbers.entities()?.into_iter().enumerate() {
         // A point has a place, all others, and the points of version 4.0, a box.
         let floats = if dimension == 0 && layout.version == Version::FourOne { 3 } else { 6 };
         for _ in 0..count {
             let tag = numbers.int()?;
-            for _ in 0..floats {
-                numbers.float()?;
-            }
-            let group = numbers.first_tag()?;
-            if dimension > 0 {
-                numbers.first_tag()?;
-            }
+            let group = numbers.rest_of_entity(dimension, floats)?;
             if dimension == 3 {
                 mesh.groups.insert(tag, group);
             }
@@ -122,21 +129,11 @@ pub(super) fn read_partitions(
         numbers.int()?;
         numbers.int()?;
     }
-    let mut counts = [0; 4];
-    for count in &mut counts {
-        *count = numbers.count()?;
-    }
-    for (dimension, count) in counts.into_iter().enumerate() {
+    for (dimension, count) in numbers.entities()?.into_iter().enumerate() {
         for _ in 0..count {
             let (tag, parent_dimension, parent) = (numbers.int()?, numbers.int()?, numbers.int()?);
             numbers.first_tag()?;
-            for _ in 0..if dimension == 0 { 3 } else { 6 } {
-                numbers.float()?;
-            }
-            let group = numbers.first_tag()?;
-            if dimension > 0 {
-                numbers.first_tag()?;
-            }
+            let group = numbers.rest_of_entity(dimension, if dimension == 0 { 3 } else { 6 })?;
             if dimension == 3 && parent_dimension == 3 {
                 mesh.partitions.insert(tag, (parent, group));
             }

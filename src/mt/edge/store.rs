@@ -457,22 +457,26 @@ mod tests {
     use crate::geom::Lattice;
     use crate::mt::FieldInfo;
 
+    fn info(bits: u32, fields: Vec<FieldInfo>) -> MtInfo {
+        MtInfo {
+            kind: MtKind::Edge,
+            lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits },
+            fields,
+            vertices: 1,
+            tetrahedra: 1,
+            updates: 1,
+            displacement_per_error: 1.0,
+            quantization: 0.0,
+            bounds: None,
+        }
+    }
+
     /// All sizes of lattices, with the largest numbers of each, and some in between.
     #[test]
     fn what_is_packed_comes_back() {
         for (bits, fields) in (1..=30).flat_map(|bits| [1, 2, 7].map(|fields| (bits, fields))) {
             let of = |f: u32| FieldInfo { bits: 1 + (bits + 5 * f) % 24, ..FieldInfo::default() };
-            let info = MtInfo {
-                kind: MtKind::Edge,
-                lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits },
-                fields: (0..fields).map(of).collect(),
-                vertices: 1,
-                tetrahedra: 1,
-                updates: 1,
-                displacement_per_error: 1.0,
-                quantization: 0.0,
-                bounds: None,
-            };
+            let info = info(bits, (0..fields).map(of).collect());
             let record = Record::new(&info);
             let ends = |bits: u32, i: usize| {
                 let largest = 1_i32 << bits;
@@ -503,17 +507,8 @@ mod tests {
 
     #[test]
     fn an_update_takes_at_most_38_bytes() {
-        let info = |bits| MtInfo {
-            kind: MtKind::Edge,
-            lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits },
-            fields: vec![FieldInfo { bits: 16, ..FieldInfo::default() }],
-            vertices: 1,
-            tetrahedra: 1,
-            updates: 1,
-            displacement_per_error: 1.0,
-            quantization: 0.0,
-            bounds: None,
-        };
-        assert_eq!([16, 21, 22, 30].map(|bits| Record::new(&info(bits)).bytes()), [34, 34, 38, 38]);
+        let field = FieldInfo { bits: 16, ..FieldInfo::default() };
+        let bytes = |bits| Record::new(&info(bits, vec![field.clone()])).bytes();
+        assert_eq!([16, 21, 22, 30].map(bytes), [34, 34, 38, 38]);
     }
 }
