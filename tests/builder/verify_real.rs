@@ -2,25 +2,17 @@
 //!
 //! Needs the environment variable TETRALOD_DATA: a folder with the data sets.
 
+use crate::support::data::real_data;
 use crate::support::meshes::built;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::{Grid, MeshFindings, RepairLevel, TetMesh, findings, repair, repair_at};
 use tetralod::mt::{ApplyUpdates, MtKind};
 use tetralod::verify::Reference;
 use tetralod::{io, verify};
 
-fn data() -> Option<PathBuf> {
-    let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
-    if data.is_none() {
-        println!("skipped: TETRALOD_DATA is not set");
-    }
-    data
-}
-
 fn load(name: &str) -> Option<TetMesh> {
-    let mesh = io::read(&data()?.join(name)).expect("a file that can be read");
+    let mesh = io::read(&real_data()?.join(name)).expect("a file that can be read");
     Some(repair(mesh).expect("a mesh that can be repaired").0)
 }
 
@@ -117,7 +109,7 @@ fn meshes_with_something_wrong_or_unusual() {
     {
         file(&format!("robust/{name}.vtu"), 1500);
     }
-    let Some(data) = data() else { return };
+    let Some(data) = real_data() else { return };
     for (name, reason) in [("can_crushed", "folded"), ("manifold_check2", "shared by")] {
         let mesh = io::read(&data.join(format!("robust/{name}.vtu"))).expect("a file that can be read");
         let refusal = repair(mesh).expect_err("not a mesh").to_string();
@@ -153,7 +145,7 @@ const BROKEN: [(&str, [Fate; 3]); 9] = [
 
 #[test]
 fn broken_meshes_end_in_a_valid_mt_or_a_reason_at_each_level() {
-    let Some(data) = data() else { return };
+    let Some(data) = real_data() else { return };
     for (name, fates) in BROKEN {
         let mesh = io::read(&data.join(name)).expect("a file that can be read");
         let mut last = None;
@@ -184,7 +176,7 @@ fn broken_meshes_end_in_a_valid_mt_or_a_reason_at_each_level() {
 
 #[test]
 fn what_is_found_in_broken_meshes_and_what_welding_closes() {
-    let Some(data) = data() else { return };
+    let Some(data) = real_data() else { return };
     let one = MeshFindings { components: 1, ..MeshFindings::default() };
     let touching = |components, non_manifold_edges, non_manifold_vertices| MeshFindings {
         components,

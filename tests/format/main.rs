@@ -6,7 +6,6 @@ mod damaged;
 mod facts;
 mod golden;
 mod histograms;
-#[allow(dead_code, reason = "each test uses a part of it")]
 mod reader;
 mod reference;
 mod reference_kinds;

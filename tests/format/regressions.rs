@@ -1,7 +1,6 @@
 //! Promise: what fuzzing has found once does not come back. Each file in `tests/regressions` goes to the fuzz target that its
 //! name begins with.
 
-#[allow(dead_code, reason = "the targets run one by one, too")]
 #[path = "../../fuzz/src/exercise.rs"]
 mod exercise;
 

@@ -1,16 +1,16 @@
 //! Promise: cells of the second order that are valid but fold as straight tetrahedra are read, conforming, with what was moved said.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
+use crate::data::real_data;
 use glam::DVec3;
 use tetralod::mesh::TetMesh;
 use tetralod::{io, mesh};
 
 /// Where the points of a cell are: in a straight cell, in units of half a side.
-type Cell = (u8, &'static [[u8; 3]]);
+pub type Cell = (u8, &'static [[u8; 3]]);
 
-const HEXAHEDRON: Cell = (
+pub const HEXAHEDRON: Cell = (
     25,
     &[
         [0, 0, 0],
@@ -305,8 +305,8 @@ fn cells_with_points_in_another_order_are_refused() {
 
 #[test]
 fn a_pipe_of_real_use_is_read() {
-    let Some(data) = std::env::var_os("TETRALOD_DATA") else { return };
-    let found = io::read(&PathBuf::from(data).join("field/hex20_pipe.vtu")).unwrap();
+    let Some(data) = real_data() else { return };
+    let found = io::read(&data.join("field/hex20_pipe.vtu")).unwrap();
     let (mended, _) = mesh::repair(found.clone()).unwrap_or_else(|error| panic!("{error}"));
     let volume = volume(&mended);
     // The curved cells, of 60 degrees each, have 0.0061426 by Gauss's rule with VTK's Jacobians; on chords an angle becomes its sine.

@@ -1,20 +1,10 @@
 //! Writes small meshes in every encoding that files come in, the plain way: the twin of the readers.
 
 use std::io::Write;
-use std::path::PathBuf;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use tetralod::mesh::{Field, Grid, TetMesh, VectorPart};
-
-/// The folder of real data sets, if this run has one; says so if not.
-pub fn real_data() -> Option<PathBuf> {
-    let folder = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: TETRALOD_DATA is not set");
-    }
-    folder
-}
 
 /// The number types of VTK XML files.
 pub const TYPES: [&str; 10] =

@@ -3,9 +3,10 @@
 mod cells;
 mod curved;
 mod damaged;
+#[path = "../support/data.rs"]
+mod data;
 mod encodings;
 mod fields;
-#[allow(dead_code, reason = "each test uses a part of it")]
 mod files;
 #[cfg(feature = "hdf5")]
 mod hdf5;

@@ -2,8 +2,9 @@
 //! nobody asked for.
 
 use std::io::Write;
-use std::path::PathBuf;
 
+use crate::curved::HEXAHEDRON;
+use crate::data::real_data;
 use tetralod::io::{self, CellData, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -206,35 +207,8 @@ fn cells_of_any_order_are_read_up_to_the_second() {
 #[test]
 fn hexahedra_of_old_versions_have_two_edges_in_another_order() {
     // The order of version 9: corners, edges (upright ones at corners 0, 1, 2, 3), faces, middle.
-    let order = [
-        [0, 0, 0],
-        [2, 0, 0],
-        [2, 2, 0],
-        [0, 2, 0],
-        [0, 0, 2],
-        [2, 0, 2],
-        [2, 2, 2],
-        [0, 2, 2],
-        [1, 0, 0],
-        [2, 1, 0],
-        [1, 2, 0],
-        [0, 1, 0],
-        [1, 0, 2],
-        [2, 1, 2],
-        [1, 2, 2],
-        [0, 1, 2],
-        [0, 0, 1],
-        [2, 0, 1],
-        [2, 2, 1],
-        [0, 2, 1],
-        [0, 1, 1],
-        [2, 1, 1],
-        [1, 0, 1],
-        [1, 2, 1],
-        [1, 1, 0],
-        [1, 1, 2],
-        [1, 1, 1],
-    ];
+    let middles = [[0, 1, 1], [2, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0], [1, 1, 2], [1, 1, 1]];
+    let order = [HEXAHEDRON.1, &middles].concat();
     let mut points: Vec<[f64; 3]> = order.iter().map(|p| p.map(f64::from)).collect();
     let all: Vec<usize> = (0..27).collect();
     let file = |points: &[[f64; 3]]| vtu(points, &[(72, &all)], "");
@@ -352,14 +326,9 @@ fn messages_name_the_cells_of_the_input() {
     assert!(error.contains("cell 2 (hexahedron)") || error.contains("2 (hexahedron)"), "{error}");
 }
 
-/// The folder of odd inputs, where there is one.
-fn field_inputs() -> Option<PathBuf> {
-    Some(PathBuf::from(std::env::var_os("TETRALOD_DATA")?).join("field"))
-}
-
 #[test]
 fn odd_inputs_have_their_right_values() {
-    let Some(folder) = field_inputs() else { return };
+    let Some(folder) = real_data().map(|data| data.join("field")) else { return };
     let load = |name: &str| io::read(&folder.join(name)).unwrap_or_else(|error| panic!("{error}"));
     assert!((volume(&load("blank.vts")) - 32.0).abs() < 1e-9);
     assert!(volume(&load("lag_tet2.vtu")) > 0.0);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::files::real_data;
+use crate::data::real_data;
 use tetralod::io::ReadError;
 use tetralod::mesh::{MeshError, TetMesh};
 use tetralod::{io, mesh};

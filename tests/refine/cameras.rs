@@ -4,10 +4,10 @@
 //! Also on real data, if the environment variable TETRALOD_DATA names a folder with the data sets.
 
 use crate::support::conformance::{DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, PAGED, SPELLED_EDGE};
+use crate::support::data::real_data;
 use crate::support::meshes::{bent, blocks, hilly};
 use crate::support::random::Random;
 use glam::DVec2;
-use std::path::PathBuf;
 use std::sync::Arc;
 use tetralod::geom::{Bounds, Camera, Projection, ViewPreset};
 use tetralod::mesh::{TetMesh, repair};
@@ -123,9 +123,7 @@ fn cameras_around_a_ball() {
 
 #[test]
 fn cameras_around_real_meshes() {
-    let Some(data) = std::env::var_os("TETRALOD_DATA").map(PathBuf::from) else {
-        return println!("skipped: TETRALOD_DATA is not set");
-    };
+    let Some(data) = real_data() else { return };
     for name in ["disk_out_ref.vtu", "hand.vtu", "piece.vtu", "cylinder_flow.vtu", "piezo_micro.vtu"] {
         let mesh = io::read(&data.join(name)).expect("a file that can be read");
         let mut mesh = repair(mesh).expect("a mesh that can be repaired").0;

@@ -7,9 +7,9 @@
 use crate::support::conformance::{
     DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, SPELLED_VERTEX, Subject, inputs,
 };
+use crate::support::data::real_data;
 use crate::support::surfaces::{Interpolant, Mesh, Surface};
 use glam::DVec3;
-use std::path::PathBuf;
 use tetralod::geom::Bounds;
 use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::{ApplyUpdates, ExplicitMt, Mt, MultiTessellation, UpdateId, VertexId};
@@ -24,11 +24,7 @@ const KINDS: [(&str, How); 4] =
 
 /// A data set; none without the folder.
 fn load(name: &str) -> Option<TetMesh> {
-    let Some(data) = std::env::var_os("TETRALOD_DATA").map(PathBuf::from) else {
-        println!("skipped: TETRALOD_DATA is not set");
-        return None;
-    };
-    let mesh = io::read(&data.join(name)).expect("a file that can be read");
+    let mesh = io::read(&real_data()?.join(name)).expect("a file that can be read");
     Some(repair(mesh).expect("a mesh that can be repaired").0)
 }
 

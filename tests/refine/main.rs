@@ -11,7 +11,6 @@ mod orders;
 mod pages;
 mod random_orders;
 mod rounding;
-#[allow(dead_code, reason = "each test uses a part of it")]
 mod subjects;
 #[path = "../support/mod.rs"]
 mod support;

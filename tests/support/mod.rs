@@ -6,6 +6,7 @@
 pub mod builder;
 pub mod compare;
 pub mod conformance;
+pub mod data;
 pub mod domains;
 pub mod files;
 pub mod meshes;

@@ -5,6 +5,7 @@
 //! All pixels are compared, also those whose rays graze an edge.
 
 use crate::scenes::Scene;
+use crate::support::data::real_data;
 use crate::twin;
 use std::path::{Path, PathBuf};
 use tetralod::geom::{Bounds, Camera};
@@ -78,10 +79,7 @@ fn difference(renderer: &mut Renderer, scene: &Scene, medium: &Medium, camera: &
 
 #[test]
 fn gpu_matches_cpu_on_data_sets() {
-    let Some(data) = std::env::var_os("TETRALOD_DATA").map(PathBuf::from) else {
-        println!("skipped: TETRALOD_DATA is not set");
-        return;
-    };
+    let Some(data) = real_data() else { return };
     let Some(mut renderer) = twin::renderer(SIZE) else { return };
     let mut paths: Vec<PathBuf> = [data.clone(), data.join("robust"), data.join("native")]
         .iter()

@@ -30,7 +30,6 @@ mod probe;
 mod samples;
 #[cfg(feature = "vulkan")]
 mod scene_pick;
-#[allow(dead_code, reason = "each test uses a part of it")]
 mod scenes;
 #[cfg(feature = "vulkan")]
 mod shade;
@@ -45,5 +44,4 @@ mod support;
 #[cfg(feature = "vulkan")]
 mod twin;
 mod volume;
-#[allow(dead_code, reason = "each test uses a part of it")]
 mod walk;

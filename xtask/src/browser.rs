@@ -58,6 +58,26 @@ pub fn firefox() -> Result<Option<PathBuf>> {
     }
 }
 
+/// Has a Vulkan adapter for the renderer's tests: what is there, or on Debian Mesa's in software. Says so where there is none;
+/// set `TETRALOD_NEED_GPU` to have tests fail that need one.
+pub fn vulkan_adapter() -> Result<()> {
+    let is_named =
+        ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].iter().any(|name| std::env::var_os(name).is_some());
+    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    let has_driver = |folder: &&str| std::fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some());
+    if is_named || !cfg!(target_os = "linux") || folders.iter().any(has_driver) {
+        return Ok(());
+    }
+    let by_hand = "the tests of the renderer need a Vulkan driver: install one, such as Mesa's in software (`mesa-vulkan-drivers`)";
+    match install_packages("a Vulkan driver", &["mesa-vulkan-drivers"], by_hand) {
+        Err(error) if std::env::var_os("TETRALOD_NEED_GPU").is_none() => {
+            println!("skipped: what draws natively ({error:#})");
+            Ok(())
+        }
+        installed => installed,
+    }
+}
+
 const BY_HAND: &str = "Chromium and chromedriver are needed: install the packages `chromium` and `chromium-driver` \
                        (Debian; elsewhere any Chromium 113 or later), or set CHROMIUM and CHROMEDRIVER to their paths";
 

@@ -4,6 +4,7 @@
 //! sets. `TETRALOD_UPDATE_GALLERY=1 cargo test --release --package tetralod-cli gallery` writes them again. All is skipped
 //! where there is no Vulkan adapter.
 
+use crate::data::real_data;
 use crate::readme::{PROMPT, arguments, content, root, write_files};
 use crate::render::Picture;
 use crate::support::{Folder, bucky, command, good, has_adapter, text};
@@ -122,7 +123,7 @@ fn commands_draw_the_pictures_that_are_shown() {
     let (page, folder) = (content(PAGE), Folder::new("gallery"));
     let path = PathBuf::from(folder.path(""));
     write_files(&page, &path);
-    let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
+    let data = real_data();
     let update = std::env::var_os("TETRALOD_UPDATE_GALLERY").is_some();
     let (mut drawn, mut skipped, mut seen) = (0, 0, Vec::new());
     for command in commands(&page) {
@@ -147,6 +148,10 @@ fn commands_draw_the_pictures_that_are_shown() {
         }
     }
     println!("{drawn} pictures compared, {skipped} skipped: their data is not here");
+    assert!(
+        skipped == 0 || data.is_none(),
+        "TETRALOD_DATA names a folder without the data of {skipped} pictures"
+    );
     assert!(seen.is_empty(), "these differ from the pictures shown: {seen:?}");
     assert!(update || drawn >= 10, "{drawn} pictures");
 }

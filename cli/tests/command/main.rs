@@ -1,6 +1,9 @@
 //! Promises of the command `tetralod`: one module for each group of subcommands.
 
 mod commands;
+#[cfg(feature = "render")]
+#[path = "../../../tests/support/data.rs"]
+mod data;
 mod fields;
 #[cfg(feature = "render")]
 mod gallery;
