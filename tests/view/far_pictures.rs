@@ -7,8 +7,8 @@ use tetralod::geom::{Bounds, Camera};
 use tetralod::gpu::wait;
 use tetralod::mesh::Field;
 use tetralod::scene::{
-    ArrowState, BoundaryState, ColourState, IsosurfaceState, PlaneState, Scene, SceneState, SliceState,
-    StreamlineState, VolumeState,
+    ArrowState, BoundaryState, CellState, ColourState, IsosurfaceState, PlaneState, Scene, SceneState,
+    SliceState, StreamlineState, VolumeState,
 };
 
 const SIZE: [u32; 2] = [120, 100];
@@ -58,6 +58,18 @@ fn states(frame: &Frame) -> Vec<(&'static str, SceneState)> {
             SceneState {
                 volume: Some(VolumeState { clipped: true, ..VolumeState::default() }),
                 clip_box: box_of(0.1, 0.8),
+                ..plain.clone()
+            },
+        ),
+        (
+            "cells",
+            SceneState {
+                cells: Some(CellState {
+                    // Through the centre of no cell.
+                    cut: Some(through([0.53; 3], [1.0, 0.0, 0.0])),
+                    shrink: 0.2,
+                    ..CellState::default()
+                }),
                 ..plain.clone()
             },
         ),

@@ -74,7 +74,7 @@ fn corner(t: u32, number: u32, k: u32, corners: array<vec4f, 4>, kept: f32) -> V
 
 // Of whole tetrahedra fronts alone are drawn.
 fn seen(in: Vertex) -> Seen {
-    return Seen(in.position, in.face, in.face, true, in.value, in.sides, fwidth(in.sides));
+    return Seen(in.position, in.face, in.face, true, in.value, in.sides, dpdx(in.sides), dpdy(in.sides));
 }
 
 @fragment

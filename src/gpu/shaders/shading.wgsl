@@ -82,7 +82,9 @@ struct Seen {
     value: f32,
     // Of the place in the triangle: 0 along each side that is an edge, 1 at the corner opposite to it.
     sides: vec3f,
-    slope: vec3f,
+    // By how much these change from a pixel to the next one, to the right and downwards.
+    sides_right: vec3f,
+    sides_down: vec3f,
 }
 
 fn lit(albedo: vec3f, n: vec3f, view: vec3f) -> vec3f {
@@ -103,18 +105,19 @@ fn edge_strength(seen: Seen) -> f32 {
     if style.shape.x <= 0.0 {
         return 0.0;
     }
-    let slope = max(seen.slope, vec3f(1e-9));
+    let right = seen.sides_right;
+    let down = seen.sides_down;
+    let slope = max(sqrt(right * right + down * down), vec3f(1e-9));
     // Of the distance to each side in pixels.
     let width = 0.5 * style.shape.x * frame.viewport.z;
     let lines = 1.0 - smoothstep(vec3f(width - 0.5), vec3f(width + 0.5), seen.sides / slope);
     let steepest = max(slope.x, max(slope.y, slope.z)) * frame.viewport.z;
     // Without the heights over all sides, by the least that is known.
     var fade = vec3f(1.0 - smoothstep(0.08, 0.35, steepest));
-    let middle = 0.5 * (slope.x + slope.y + slope.z);
-    let product = middle * (middle - slope.x) * (middle - slope.y) * (middle - slope.z);
-    if min(slope.x, min(slope.y, slope.z)) > 1e-6 && product > 0.0 {
-        // The slopes are one over the heights, and so the area is one over four times the root of the product.
-        let lengths = slope / (2.0 * sqrt(product) * frame.viewport.z);
+    // Each slope is one over a height, and this one over twice the area.
+    let per_area = abs(right.x * down.y - right.y * down.x);
+    if min(slope.x, min(slope.y, slope.z)) > 1e-6 && per_area > 0.0 {
+        let lengths = slope / (per_area * frame.viewport.z);
         fade = smoothstep(vec3f(3.0), vec3f(12.0), lengths) * (1.0 - smoothstep(0.5, 2.0, steepest));
     }
     let strength = lines * fade;

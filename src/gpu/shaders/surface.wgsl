@@ -55,7 +55,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Vertex {
 }
 
 fn seen(in: Vertex, is_front: bool) -> Seen {
-    return Seen(in.position, in.normal, in.face, is_front, in.value, in.sides, fwidth(in.sides));
+    return Seen(in.position, in.normal, in.face, is_front, in.value, in.sides, dpdx(in.sides), dpdy(in.sides));
 }
 
 @fragment
