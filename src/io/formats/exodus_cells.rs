@@ -21,6 +21,9 @@ const HEXAHEDRON_27: &[usize] =
     &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22, 20];
 const WEDGE_15: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11];
 const WEDGE_18: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 15, 16, 17];
+/// Those of the triangles come before those of the quadrilaterals, and that of the whole before both.
+const WEDGE_20: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 19, 17, 18];
+const WEDGE_21: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 20, 18, 19];
 const FIRST: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13];
 
 /// The elements of a block, by the name of their type, of which only the beginning counts, and their number of points.
@@ -35,10 +38,12 @@ pub(super) fn element(name: &str, points: usize) -> Option<Element> {
         ("TET", 10 | 11 | 14 | 15) => first(24, 10),
         ("PYR", 5) => first(14, 5),
         ("PYR", 13) => first(27, 13),
-        ("PYR", 14) => first(PYRAMID_14, 14),
+        ("PYR", 14 | 18) => first(PYRAMID_14, 14),
         ("WED", 6 | 7) => first(13, 6),
         ("WED", 15 | 16) => Some(Element::Solid(26, WEDGE_15)),
         ("WED", 18) => Some(Element::Solid(32, WEDGE_18)),
+        ("WED", 20) => Some(Element::Solid(32, WEDGE_20)),
+        ("WED", 21) => Some(Element::Solid(32, WEDGE_21)),
         ("HEX", 8 | 9) => first(12, 8),
         ("HEX", 20 | 21) => Some(Element::Solid(25, HEXAHEDRON_20)),
         ("HEX", 27) => Some(Element::Solid(29, HEXAHEDRON_27)),
@@ -116,20 +121,40 @@ mod tests {
         &[1, 2, 5, 4],
         &[2, 0, 3, 5],
     ];
+    /// As libMesh has them in PRISM21, and without the first one in PRISM20.
+    const PRISM_ALL_MIDDLES: [&[usize]; 6] =
+        [&[0, 1, 2, 3, 4, 5], &[0, 1, 2], &[3, 4, 5], &[1, 2, 5, 4], &[2, 0, 3, 5], &[0, 1, 4, 3]];
     const TETRAHEDRON: [[i64; 3]; 4] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
     const TETRAHEDRON_MIDDLES: [&[usize]; 6] = [&[0, 1], &[1, 2], &[2, 0], &[0, 3], &[1, 3], &[2, 3]];
     const PYRAMID: [[i64; 3]; 5] = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1]];
-    const PYRAMID_MIDDLES: [&[usize]; 9] =
-        [&[0, 1], &[1, 2], &[2, 3], &[3, 0], &[0, 4], &[1, 4], &[2, 4], &[3, 4], &[0, 1, 2, 3]];
+    const PYRAMID_MIDDLES: [&[usize]; 13] = [
+        &[0, 1],
+        &[1, 2],
+        &[2, 3],
+        &[3, 0],
+        &[0, 4],
+        &[1, 4],
+        &[2, 4],
+        &[3, 4],
+        &[0, 1, 2, 3],
+        &[0, 1, 4],
+        &[1, 2, 4],
+        &[2, 3, 4],
+        &[3, 0, 4],
+    ];
 
     #[test]
     fn elements_fill_their_volume_with_tetrahedra_that_do_not_overlap() {
         let unit = 12 * 12 * 12;
+        let [prism_20, prism_21] =
+            [1, 0].map(|first| [&PRISM_MIDDLES[..9], &PRISM_ALL_MIDDLES[first..]].concat());
         for (name, corners, middles, counts, whole) in [
             ("HEX", &CUBE[..], &CUBE_MIDDLES[..], &[0, 12, 19][..], 6 * unit),
             ("WEDGE", &PRISM[..], &PRISM_MIDDLES[..], &[0, 9, 12][..], 3 * unit),
+            ("WEDGE", &PRISM[..], &prism_20[..], &[14][..], 3 * unit),
+            ("WEDGE", &PRISM[..], &prism_21[..], &[15][..], 3 * unit),
             ("tetra", &TETRAHEDRON[..], &TETRAHEDRON_MIDDLES[..], &[0, 6][..], unit),
-            ("PYRAMID", &PYRAMID[..], &PYRAMID_MIDDLES[..], &[0, 8, 9][..], 2 * unit),
+            ("PYRAMID", &PYRAMID[..], &PYRAMID_MIDDLES[..], &[0, 8, 9, 13][..], 2 * unit),
         ] {
             for &count in counts {
                 let volumes = volumes(name, &sums(corners, &middles[..count]));
