@@ -67,6 +67,7 @@ export function emptyMesh() {
   return {
     positions: new Float32Array(),
     field: new Float32Array(),
+    fields: [],
     tets: new Uint32Array(),
     neighbors: new Uint32Array(),
     origin: [0, 0, 0],
@@ -99,6 +100,8 @@ export function applyChanges(mesh, delta) {
     mesh[name] = array;
   }
   for (const name of STORED) mesh[name] = delta[name];
+  // They were those of the mesh before.
+  mesh.fields = [];
   mesh.changes = delta.changes;
   return mesh;
 }

@@ -11,6 +11,7 @@ import { Parts } from "./parts.js";
 import { FirstResponse, SharedRanges } from "./ranges.js";
 import { portEndpoint, serve } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
+import { withFields } from "./stored.js";
 import { copyToolMethods, limitOf } from "./tools.js";
 import { VERSION } from "./version.js";
 
@@ -123,14 +124,17 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     } while (!done || parts.isWaiting);
   };
   /** The mesh as it is now, or what has changed in it, after a step. */
-  const result = ({ stats, more }, { deltas, arrays, zeroCopy }) => {
-    if (!zeroCopy) return { ...(deltas ? session.delta(arrays) : session.mesh(arrays)), stats, more };
-    const mesh = session.mesh(0);
+  const result = ({ stats, more }, { deltas, arrays, zeroCopy, fields = [] }) => {
+    if (deltas) return { ...session.delta(arrays), stats, more };
+    const mesh = session.mesh(zeroCopy ? 0 : arrays);
+    withFields(mesh, fields, fields.map(({ index }) => session.values(index)));
+    if (!zeroCopy) return { ...mesh, stats, more };
+    // Last: where the memory grows, views of it end.
     const places = session.places();
     return { ...mesh, ...arraysIn(wasm.memory.buffer, places, arrays), stats, more };
   };
-  /** The tools, with the mesh as it is now: what has changed since the last time is copied. */
-  const toolsNow = async () => {
+  /** Calls `use` with the tools and the mesh as it is now: what has changed since the last time is copied. */
+  const withTools = async (use) => {
     const { Tools, memory } = await loadTools();
     const changed = session.copied(!tools);
     const made = tools ?? new Tools();
@@ -141,7 +145,7 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     const copies = made.change(places[1] / 3, places[5] / 4, changed.vertices, changed.tets);
     copyChanged([wasm.memory.buffer, places], [memory.buffer, copies], changed);
     tools = made;
-    return tools;
+    return use(tools);
   };
   const close = (reason) => {
     parts?.close(reason);
@@ -242,7 +246,7 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     /** Ends the fetching; the mesh stays usable. */
     halt: () => parts?.close(new TetralodError("freed", "the download was ended")),
     setField: (name) => session.setField(name),
-    ...copyToolMethods(() => session, toolsNow),
+    ...copyToolMethods(() => session, withTools),
     /** Begins another session over the same bytes, which is called through `port`. */
     view(port) {
       shared.count(1);

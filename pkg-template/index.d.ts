@@ -23,6 +23,7 @@ import type {
   FieldError,
   FieldInfo,
   FieldStats,
+  FieldValues,
   IsoSurface,
   LineProfile,
   Mesh,
@@ -49,6 +50,7 @@ export type {
   FieldError,
   FieldInfo,
   FieldStats,
+  FieldValues,
   IsoSurface,
   LineProfile,
   Mesh,
@@ -185,8 +187,22 @@ export interface RefineStats extends CoreStats {
 /** The arrays of a mesh. */
 export type MeshArray = "positions" | "field" | "tets" | "neighbors";
 
+/** Which fields come with a mesh or a surface, besides the one that is chosen. */
+export interface FieldOptions {
+  /**
+   * All fields of the volume with `true`, or those of these names or numbers in `info.fields`; a name of several time steps is the first.
+   * They are in `fields` of the result, in this order. Default: none.
+   *
+   * @example
+   * const { positions, indices, fields } = absolute(await mt.isosurface(0.7, { fields: true }));
+   * for (const { name, values } of fields) console.log(name, values[0]);
+   * @throws {TetralodError} `bad-option` if there is no such field
+   */
+  fields?: boolean | readonly (string | number)[];
+}
+
 /** How a mesh is handed out. */
-export interface ResultOptions<A extends MeshArray = MeshArray> {
+export interface ResultOptions<A extends MeshArray = MeshArray> extends FieldOptions {
   /** Whether to return at once what is possible with the data that has arrived. Default: false. */
   partial?: boolean;
   /** The arrays to return; none with `[]`. Default: all four. What you do not use need not be made and sent. */
@@ -233,6 +249,24 @@ export interface StepOptions<A extends MeshArray = MeshArray> {
   signal?: AbortSignal;
 }
 
+/** What {@link absolute} makes of a result. */
+export type Absolute<T> = {
+  [K in keyof T]: K extends "positions" | "values" | "field"
+    ? Float32Array | Float64Array | Extract<T[K], undefined>
+    : K extends "fields"
+      ? Absolute<FieldValues>[]
+      : T[K];
+};
+
+/**
+ * A mesh or a surface in absolute numbers, as files need them: positions in model units, values in units of their field; `origin`, `offset`
+ * and `scale` are 0, 0 and 1. Arrays that were absolute, as most are, are the same ones; others are copies in double precision.
+ *
+ * @example
+ * const { positions, values } = absolute(await mt.slice([0, 0, 1], 0.5));
+ */
+export function absolute<T extends Partial<Stored>>(stored: T): Absolute<T>;
+
 /** A mesh without tetrahedra: {@link applyChanges} starts with it if no mesh has been returned before. */
 export function emptyMesh(): Omit<RefineResult, "stats">;
 
@@ -266,7 +300,7 @@ export interface MeshTools<Aside = AwaitOptions & { request?: never }> {
    */
   isosurface(
     values: number | ArrayLike<number>,
-    how?: { normals?: "gradient" | "smooth" } & Aside,
+    how?: { normals?: "gradient" | "smooth" } & FieldOptions & Aside,
   ): Promise<IsoSurface & { values: Float32Array }>;
 
   /**
@@ -276,10 +310,10 @@ export interface MeshTools<Aside = AwaitOptions & { request?: never }> {
    * @example
    * const cut = await mt.slice([0, 0, 1], 2.5);                       // z = 2.5
    */
-  slice(normal: ArrayLike<number>, offset: number, how?: Aside): Promise<Slice>;
+  slice(normal: ArrayLike<number>, offset: number, how?: FieldOptions & Aside): Promise<Slice>;
 
   /** The boundary of the current mesh, facing outwards. */
-  surface(how?: Aside): Promise<Surface>;
+  surface(how?: FieldOptions & Aside): Promise<Surface>;
 
   /** The field at some points, three coordinates each, in model units; NaN outside of the mesh. */
   probe(points: ArrayLike<number>, how?: Aside): Promise<Float64Array>;
@@ -431,10 +465,10 @@ export class MultiTessellation extends WithMeshTools {
   refine<A extends MeshArray = MeshArray>(
     options?: RefineOptions,
     how?: ResultOptions<A> & { deltas?: false },
-  ): Promise<Pick<RefineResult, A | keyof Stored | "changes" | "stats">>;
+  ): Promise<Pick<RefineResult, A | keyof Stored | "fields" | "changes" | "stats">>;
   refine<A extends MeshArray = MeshArray>(
     options: RefineOptions | undefined,
-    how: Omit<ResultOptions<A>, "zeroCopy"> & { deltas: true },
+    how: Omit<ResultOptions<A>, "zeroCopy" | "fields"> & { deltas: true },
   ): Promise<Pick<RefineDelta, A | keyof Stored | "changes" | "stats" | "vertexCount" | "tetCount">>;
 
   /**
@@ -451,7 +485,7 @@ export class MultiTessellation extends WithMeshTools {
   refineSteps<A extends MeshArray = MeshArray>(
     options?: RefineOptions,
     how?: StepOptions<A> & { deltas?: false },
-  ): AsyncGenerator<Pick<RefineResult, A | keyof Stored | "changes" | "stats">, void, void>;
+  ): AsyncGenerator<Pick<RefineResult, A | keyof Stored | "fields" | "changes" | "stats">, void, void>;
   refineSteps<A extends MeshArray = MeshArray>(
     options: RefineOptions | undefined,
     how: StepOptions<A> & { deltas: true },

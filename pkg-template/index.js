@@ -8,15 +8,17 @@ import { coreRemedy, coreScript, coreWasm, startCore, toolsWasm } from "./files.
 import { TetralodError, reviveError } from "./errors.js";
 import { openOptions, sendable } from "./options.js";
 import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
+import { absolute, fieldsOf } from "./stored.js";
 import { abortable, isRepeatable, openSource, pump, rangesOf } from "./stream.js";
 import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
-export { TetralodError, applyChanges, emptyMesh };
+export { TetralodError, absolute, applyChanges, emptyMesh };
 
 const OPEN_OPTIONS = ["signal", "onProgress", ...PLACES, "toolsUrl"];
 const NO_RETRY = "only a file that is fetched in parts can be continued: open it again";
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "arrays", "signal"];
 const NO_VIEW = "a stream is read only once; for views, open a URL, a Blob or bytes in memory";
+const NO_FIELDS = "goes with whole meshes, without `deltas`";
 const NO_ZERO_COPY = "needs `worker: false`, and no `deltas`: no other thread has this memory";
 
 /** A volume that is open: it can be refined while the rest of it is still arriving. */
@@ -103,11 +105,13 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
   }
 
   async refine(options = {}, how = {}) {
-    checkNames(how, ["deltas", "partial", "arrays", "zeroCopy", "signal"]);
+    checkNames(how, ["deltas", "partial", "arrays", "fields", "zeroCopy", "signal"]);
     const { deltas = false, partial = false, zeroCopy = false, signal } = how;
     signal?.throwIfAborted();
+    const fields = fieldsOf(this.#info, how.fields);
+    if (deltas && fields.length > 0) throw new TetralodError("bad-option", `option \`fields\`: ${NO_FIELDS}`);
     if (zeroCopy && (this.#inWorker || deltas)) throw new TetralodError("bad-option", `option \`zeroCopy\`: ${NO_ZERO_COPY}`);
-    const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays), zeroCopy: Boolean(zeroCopy) };
+    const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays), fields, zeroCopy: Boolean(zeroCopy) };
     const sent = sendable(options, this.#inWorker);
     const { goal, asked } = this.#request((number) => this.#make(number, sent, what, partial));
     if (!signal) return asked;

@@ -176,10 +176,10 @@ async function answer(endpoint, methods, { id, method, args }) {
   }
 }
 
-/** The buffers of the typed arrays that are direct members of `value`: each of ours owns its buffer. */
+/** The buffers of the typed arrays that are direct members of `value`, and of those of its fields: each of ours owns its buffer. */
 function buffersOf(value) {
   if (typeof value !== "object" || value === null) return [];
-  return Object.values(value)
+  return [...Object.values(value), ...(value.fields ?? []).map(({ values }) => values)]
     .filter((member) => ArrayBuffer.isView(member))
     .map((member) => member.buffer);
 }

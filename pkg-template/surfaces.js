@@ -19,19 +19,6 @@ async function extract(volume, what) {
   return volume.isosurface(isosurface, normals === undefined ? {} : { normals });
 }
 
-/**
- * Positions and values in absolute numbers: the arrays themselves where these are, else copies in double precision.
- *
- * @param {{ positions: Float32Array, values?: Float32Array, origin: number[], offset: number, scale: number }} stored
- */
-export function absolute({ positions, values, origin, offset, scale }) {
-  const isAt = origin.every((x) => x === 0);
-  return {
-    positions: isAt ? positions : Float64Array.from(positions, (x, i) => origin[i % 3] + x),
-    values: values && (offset !== 0 || scale !== 1) ? Float64Array.from(values, (v) => offset + scale * v) : values,
-  };
-}
-
 /** What keeps `take` supplied: later updates replace those that wait. */
 export class Surface {
   #volume;

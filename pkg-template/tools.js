@@ -1,6 +1,7 @@
 /** What can be got out of the current mesh: the same calls in `MultiTessellation` and in `Viewer`. */
 
 import { TetralodError } from "./errors.js";
+import { fieldsOf, withFields } from "./stored.js";
 import { abortable } from "./stream.js";
 
 /**
@@ -27,24 +28,24 @@ async function call(object, method, args, { request, signal } = /** @type {any} 
 export const withMeshTools = (Base) =>
   class extends Base {
     async isosurface(values, how = {}) {
-      checkNames(how, ["normals", "request", "signal"]);
-      const { normals = "gradient" } = how;
+      checkNames(how, ["normals", "fields", "request", "signal"]);
+      const { normals = "gradient", fields } = how;
       if (normals !== "gradient" && normals !== "smooth") {
         throw new TetralodError("bad-option", 'option `normals`: must be "gradient" or "smooth"');
       }
       const list = typeof values === "number" ? [values] : values;
-      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth"], how);
+      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth", fieldsOf(this.info, fields)], how);
     }
 
     async slice(normal, offset, how = {}) {
-      checkNames(how, ["request", "signal"]);
+      checkNames(how, ["fields", "request", "signal"]);
       if (typeof offset !== "number") throw new TetralodError("bad-option", "option `offset`: must be a number");
-      return call(this, "slice", [numbers("normal", normal), offset], how);
+      return call(this, "slice", [numbers("normal", normal), offset, fieldsOf(this.info, how.fields)], how);
     }
 
     async surface(how = {}) {
-      checkNames(how, ["request", "signal"]);
-      return call(this, "surface", [], how);
+      checkNames(how, ["fields", "request", "signal"]);
+      return call(this, "surface", [fieldsOf(this.info, how.fields)], how);
     }
 
     async probe(points, how = {}) {
@@ -82,15 +83,20 @@ export const withMeshTools = (Base) =>
     }
   };
 
+const numbersOf = (fields) => fields.map(({ index }) => index);
+
+/** A surface with its arrays of fields as they are stored. */
+const onSurface = (fields, surface) => withFields(surface, fields, surface.fields);
+
 /**
  * The calls in the worker; `session` gives the object of the wasm module that answers them.
  *
  * @param {() => any} session
  */
 export const meshToolMethods = (session) => ({
-  isosurface: (values, smooth) => session().isosurfaces(values, smooth),
-  slice: (normal, offset) => session().slice(normal, offset),
-  surface: () => session().surface(),
+  isosurface: (values, smooth, fields) => onSurface(fields, session().isosurfaces(values, smooth, numbersOf(fields))),
+  slice: (normal, offset, fields) => onSurface(fields, session().slice(normal, offset, numbersOf(fields))),
+  surface: (fields) => onSurface(fields, session().surface(numbersOf(fields))),
   probe: (points) => session().probe(points),
   line: (from, to) => session().line(from, to),
   streamlines: (fields, seeds, backward, maxLength, maxSteps) =>
@@ -103,25 +109,26 @@ export const meshToolMethods = (session) => ({
  * The same where the tools are in another module than the session, on a copy of its mesh.
  *
  * @param {() => any} session
- * @param {() => Promise<any>} tools with the mesh as it is now
+ * @param {(use: (tools: any) => any) => Promise<any>} tools calls `use` with the mesh as it is then
  */
-export const copyToolMethods = (session, tools) => ({
-  isosurface: async (values, smooth) => (await tools()).isosurfaces(values, smooth),
-  slice: async (normal, offset) => (await tools()).slice(normal, offset),
-  surface: async () => (await tools()).surface(),
-  probe: async (points) => (await tools()).probe(points),
-  line: async (from, to) => (await tools()).line(from, to),
-  async streamlines(fields, ...how) {
-    const on = await tools();
-    return on.streamlines(...fields.map((name) => session().values(name)), ...how);
-  },
-  async stats(bins, low, high, fractions) {
-    const on = await tools();
-    const [min, max] = session().range();
-    return on.stats(bins, Number.isNaN(low) ? min : low, Number.isNaN(high) ? max : high, fractions);
-  },
-  hash: () => session().hash(),
-});
+export const copyToolMethods = (session, tools) => {
+  const values = (field) => session().values(field);
+  const arrays = (fields) => numbersOf(fields).map(values);
+  return {
+    isosurface: (at, smooth, fields) => tools((on) => onSurface(fields, on.isosurfaces(at, smooth, arrays(fields)))),
+    slice: (normal, offset, fields) => tools((on) => onSurface(fields, on.slice(normal, offset, arrays(fields)))),
+    surface: (fields) => tools((on) => onSurface(fields, on.surface(arrays(fields)))),
+    probe: (points) => tools((on) => on.probe(points)),
+    line: (from, to) => tools((on) => on.line(from, to)),
+    streamlines: (fields, ...how) => tools((on) => on.streamlines(...fields.map(values), ...how)),
+    stats: (bins, low, high, fractions) =>
+      tools((on) => {
+        const [min, max] = session().range();
+        return on.stats(bins, Number.isNaN(low) ? min : low, Number.isNaN(high) ? max : high, fractions);
+      }),
+    hash: () => session().hash(),
+  };
+};
 
 /**
  * What keeps a mesh from being finer.

@@ -12,6 +12,7 @@ import { received } from "./options.js";
 import { Parts } from "./parts.js";
 import { serve, webEndpoint } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
+import { withFields } from "./stored.js";
 import { limitOf, meshToolMethods } from "./tools.js";
 import { VERSION } from "./version.js";
 
@@ -319,7 +320,7 @@ const methods = {
     }
   },
 
-  mesh: () => viewer.mesh(),
+  mesh: (fields) => withFields(viewer.mesh(), fields, fields.map(({ index }) => viewer.values(index))),
 
   /** Where the blocks of the file are, and which of them are here; nothing where it has none. */
   blockMap() {

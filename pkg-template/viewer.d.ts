@@ -16,6 +16,7 @@
 
 import type {
   BlockProgress,
+  FieldOptions,
   Mesh,
   MeshTools,
   MtInfo,
@@ -27,7 +28,7 @@ import type {
   ViewOptions,
 } from "./index.js";
 
-export { TetralodError } from "./index.js";
+export { TetralodError, absolute } from "./index.js";
 
 /** How much of a file has arrived. */
 export interface ViewerProgress {
@@ -553,9 +554,9 @@ export class Viewer extends EventTargetWithMeshTools {
    * A copy of the mesh that is shown, in arrays that belong to the caller.
    *
    * @example
-   * const { positions, tets } = await viewer.mesh();
+   * const { positions, tets, fields } = await viewer.mesh({ fields: true });
    */
-  mesh(): Promise<Mesh>;
+  mesh(how?: FieldOptions): Promise<Mesh>;
   /** Where the blocks of the file are, and which of them are here; `undefined` for a file without blocks. */
   blockMap(): Promise<BlockMap | undefined>;
   /**

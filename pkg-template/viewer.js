@@ -10,10 +10,12 @@ import { changedScene } from "./fit.js";
 import { Latest, deferred, mergeUpdates } from "./latest.js";
 import { openOptions, sendable } from "./options.js";
 import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
+import { fieldsOf } from "./stored.js";
 import { abortable, openSource, pump, rangesOf } from "./stream.js";
 import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
 export { TetralodError } from "./errors.js";
+export { absolute } from "./stored.js";
 
 const NO_WEBGPU =
   "this browser has no WebGPU; use a current Chrome, Edge, Firefox or Safari over https (or on localhost)";
@@ -490,8 +492,9 @@ export class Viewer extends withMeshTools(EventTarget) {
   }
 
   /** A copy of the mesh that is shown. */
-  mesh() {
-    return this.#remote.call("mesh");
+  async mesh({ fields, ...others } = /** @type {any} */ ({})) {
+    checkNames(others, [], ["fields"]);
+    return this.#remote.call("mesh", [fieldsOf(this.#info, fields)]);
   }
 
   /** Where the blocks of the file are, and which of them are here; `undefined` where it has none. */

@@ -1,6 +1,7 @@
 /** Surfaces of a volume as a `vtkPolyData` of vtk.js, which is updated in place. */
 
-import { Surface, absolute } from "./surfaces.js";
+import { absolute } from "./stored.js";
+import { Surface } from "./surfaces.js";
 import { checkNames } from "./tools.js";
 
 export async function createSurface(volume, what, options = {}) {
@@ -45,13 +46,9 @@ class VtkSurface {
     this.dispose();
   }
 
-  /**
-   * @param {{ indices: Uint32Array, normals?: Float32Array, positions: Float32Array, values?: Float32Array, origin: number[],
-   *   offset: number, scale: number }} triangles
-   */
-  #take({ indices, normals, ...stored }) {
+  #take(triangles) {
     const { polyData } = this;
-    const { positions, values } = absolute(stored);
+    const { positions, indices, normals, values } = absolute(triangles);
     polyData.getPoints().setData(positions, 3);
     polyData.getPolys().setData(cellsOf(indices), 1);
     const data = polyData.getPointData();

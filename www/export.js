@@ -1,5 +1,6 @@
 /** Files made of what is shown: the picture, the mesh, surfaces, probes. */
 
+import { absolute } from "tetralod/viewer";
 import { $, all } from "./dom.js";
 import { count } from "./format.js";
 import { fail } from "./messages.js";
@@ -13,8 +14,6 @@ import { note } from "./share.js";
 import { onTab } from "./tabs.js";
 import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "./writers.js";
 
-/** @typedef {import("./writers.js").Triangles} Triangles */
-
 function saveAs(name, parts, type) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob(parts, { type }));
@@ -24,17 +23,13 @@ function saveAs(name, parts, type) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** The triangles that are chosen. @returns {Promise<Triangles>} */
-async function triangles() {
-  const { viewer, field } = page;
+/** The triangles that are chosen. @returns {Promise<import("tetralod").Surface & { normals?: Float32Array }>} */
+async function triangles(how = {}) {
+  const { viewer } = page;
   const kind = $("surface-kind").value;
-  if (kind === "isosurface") {
-    const surface = await viewer.isosurface(isovalue());
-    return { ...surface, name: field.name };
-  }
+  if (kind === "isosurface") return viewer.isosurface(isovalue(), how);
   const { normal, offset } = plane();
-  const surface = kind === "slice" ? await viewer.slice(normal, offset) : await viewer.surface();
-  return { ...surface, name: field.name };
+  return kind === "slice" ? viewer.slice(normal, offset, how) : viewer.surface(how);
 }
 
 /** How long the colours of the field are waited for (in ms). */
@@ -60,8 +55,7 @@ async function legend() {
 /** The triangles that are chosen, with the colours that their values have. */
 async function coloured() {
   const [surface, colours] = [await triangles(), await legend()];
-  const { values } = surface;
-  return colours && values ? { ...surface, colours: coloursOf({ ...surface, values }, colours) } : surface;
+  return colours ? { ...surface, colours: coloursOf(surface, colours) } : surface;
 }
 
 /** The values at the probes, and along the line between two of them. */
@@ -83,12 +77,15 @@ async function probes() {
   return csv([head, ...rows, ...onLine]);
 }
 
+/** What is asked for of files that hold all fields. */
+const ALL = { fields: true };
+
 /** How each file is made. @type {Record<string, () => Promise<[parts: BlobPart[] | undefined, type: string]>>} */
 const MAKERS = {
-  vtu: async () => [vtu(await page.viewer.mesh(), page.field.name), "application/xml"],
-  vtk: async () => [vtk(await page.viewer.mesh(), page.field.name), "application/octet-stream"],
+  vtu: async () => [vtu(absolute(await page.viewer.mesh(ALL)), page.field.number), "application/xml"],
+  vtk: async () => [vtk(absolute(await page.viewer.mesh(ALL)), page.field.number), "application/octet-stream"],
   stl: async () => [stl(await triangles()), "model/stl"],
-  ply: async () => [ply(await triangles()), "application/octet-stream"],
+  ply: async () => [ply(absolute(await triangles(ALL))), "application/octet-stream"],
   glb: async () => [glb(await coloured()), "model/gltf-binary"],
   csv: async () => [await probes(), "text/csv"],
 };
@@ -137,6 +134,6 @@ export function attachExport(canvas) {
   for (const button of all("[data-export]")) onPress(button, () => exportAs(button.dataset.export));
   onTab((name) => {
     if (name !== "export" || !demo.step) return;
-    $("mesh-words").textContent = `The mesh as it is shown: ${count(demo.step.tetrahedra)} tetrahedra with ${page.field.name}`;
+    $("mesh-words").textContent = `The mesh as it is shown: ${count(demo.step.tetrahedra)} tetrahedra with all fields`;
   });
 }

@@ -1,56 +1,116 @@
 /** Meshes and triangles as files that other programs read. Each gives the parts of a file, one after the other. */
 
-/** @typedef {{ origin: number[], offset: number, scale: number }} Stored what positions and values are relative to */
-/** @typedef {Stored & { positions: Float32Array, field: Float32Array, tets: Uint32Array }} TetMesh */
+/** @typedef {Float32Array | Float64Array} Numbers */
+/** @typedef {Pick<import("tetralod").FieldValues, "index" | "name" | "time" | "vector"> & { values: Numbers }} Field */
+/** @typedef {{ positions: Numbers, fields: Field[], tets: Uint32Array }} TetMesh in absolute numbers */
+/** @typedef {{ positions: Numbers, fields: Field[], indices: Uint32Array, normals?: Float32Array }} Surface in absolute numbers */
 /**
- * @typedef {Stored & { positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array, name: string,
+ * @typedef {import("tetralod").Stored & { positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array,
  *   colours?: Float32Array }} Triangles colours are three numbers a vertex: linear light, 0 to 1
  */
 
 const TETRAHEDRON = 10;
 
-/** A name without what has a meaning in the formats. */
-const plain = (name) => name.replaceAll(/[^\w.-]/g, "_");
+/** Names without what has a meaning in the formats, each once. @param {string[]} names @param {string[]} [taken] those that are in use */
+function plain(names, taken = []) {
+  const found = [];
+  for (const name of names) {
+    const base = name.replaceAll(/\W/g, "_");
+    let own = base;
+    for (let i = 1; own === "" || found.includes(own) || taken.includes(own); i++) own = `${base}_${i}`;
+    found.push(own);
+  }
+  return found;
+}
 
-/** Absolute positions: in double precision where single precision would lose digits. @param {Float32Array} positions @param {Stored} stored */
-const absolutePositions = (positions, { origin }) =>
-  origin.every((x) => x === 0) ? positions : Float64Array.from(positions, (x, i) => origin[i % 3] + x);
-
-/** The same of values. @param {Float32Array} values @param {Stored} stored */
-const absoluteValues = (values, { offset, scale }) =>
-  offset === 0 && scale === 1 ? values : Float64Array.from(values, (v) => offset + scale * v);
+/** Text for an attribute of XML. */
+const escaped = (text) => text.replaceAll(/[<>&"']/g, (c) => `&#${c.codePointAt(0)};`).replaceAll(/\p{Cc}/gu, " ");
 
 /** Which of two words is that of the numbers of an array. */
 const ofType = (array, single, double) => (array instanceof Float64Array ? double : single);
 
+/** What a component of so many is called. */
+function componentName(count, c) {
+  if (count <= 3) return "xyz"[c];
+  if (count === 6) return ["xx", "yy", "zz", "xy", "yz", "xz"][c];
+  return count === 9 ? "xyz"[Math.floor(c / 3)] + "xyz"[c % 3] : String(c);
+}
+
+/** How many of the first fields are the components of one vector, named as those of files are; else 1. @param {Field[]} fields */
+function componentsOf(fields) {
+  const [{ vector, time }] = fields;
+  const isNext = (field, c) => vector && field.vector?.name === vector.name && field.vector.component === c && field.time === time;
+  const end = fields.findIndex((field, c) => !isNext(field, c));
+  const count = end < 0 ? fields.length : end;
+  const isNamed = ({ name }, c) => name === `${vector.name}_${componentName(count, c)}`;
+  return count > 1 && fields.slice(0, count).every(isNamed) ? count : 1;
+}
+
+/** The name of a field or its vector, with the time where there are several. @param {Field[]} fields @param {Field} field */
+function nameOf(fields, { name, time }, own = name) {
+  const several = fields.some((other) => other.name === name && other.time !== time);
+  return several && time !== undefined ? `${own}@${Number.isInteger(time) ? `${time}.0` : time}` : own;
+}
+
+/** The numbers of some fields, those of a vertex one behind the other. @param {Field[]} fields */
+function interleaved(fields) {
+  const count = fields.length;
+  if (count === 1) return fields[0].values;
+  const Floats = fields.some(({ values }) => values instanceof Float64Array) ? Float64Array : Float32Array;
+  return Floats.from({ length: count * fields[0].values.length }, (_, i) => fields[i % count].values[Math.floor(i / count)]);
+}
+
+/**
+ * The fields as arrays of a file, as `tetralod extract` writes them: components that follow one another are a vector again, and its length,
+ * which follows from them, is left out.
+ *
+ * @param {Field[]} fields
+ */
+function arraysOf(fields) {
+  /** @type {{ name: string, size: number, values: Numbers, field: Field }[]} */
+  const arrays = [];
+  for (let i = 0, size = 1; i < fields.length; i += size) {
+    const field = fields[i];
+    size = componentsOf(fields.slice(i));
+    const { vector, time } = field;
+    const isOf = (array) => array.size > 1 && array.field.vector.name === vector.name && array.field.time === time;
+    if (vector && vector.component === undefined && arrays.some(isOf)) continue;
+    const name = nameOf(fields, field, size > 1 ? vector?.name : undefined);
+    arrays.push({ name, size, values: interleaved(fields.slice(i, i + size)), field });
+  }
+  return arrays;
+}
+
+/** The one of the arrays that is the field of this number, unless that is part of a vector. */
+const arrayOf = (arrays, number) => arrays.find(({ size, field }) => size === 1 && field.index === number);
+
 /**
  * VTK XML, unstructured grid, arrays appended as they are.
  *
- * @param {TetMesh} mesh @param {string} name of the field @returns {BlobPart[]}
+ * @param {TetMesh} mesh @param {number} shown the number of the field that is shown first @returns {BlobPart[]}
  */
-export function vtu(mesh, name) {
-  const { tets } = mesh;
-  const [positions, field] = [absolutePositions(mesh.positions, mesh), absoluteValues(mesh.field, mesh)];
+export function vtu({ positions, tets, fields }, shown) {
   const [points, cells] = [positions.length / 3, tets.length / 4];
-  const ends = Uint32Array.from({ length: cells }, (_, i) => 4 * (i + 1));
-  const types = new Uint8Array(cells).fill(TETRAHEDRON);
-  const arrays = [field, positions, tets, ends, types];
+  const appended = [];
   let offset = 0;
-  const [values, places, corners, offsets, kinds] = arrays.map((array) => {
-    const at = offset;
-    offset += 8 + array.byteLength;
-    return at;
-  });
-  const array = (type, label, more, at) => `<DataArray type="${type}" Name="${label}"${more} format="appended" offset="${at}"/>`;
+  const array = (data, name, size = 1) => {
+    const type = data.constructor.name.replace("Array", "").replace("Uint", "UInt");
+    const element = `<DataArray type="${type}" Name="${escaped(name)}" NumberOfComponents="${size}" format="appended" offset="${offset}"/>`;
+    appended.push(BigUint64Array.of(BigInt(data.byteLength)), data);
+    offset += 8 + data.byteLength;
+    return element;
+  };
+  const arrays = arraysOf(fields);
+  const scalars = arrayOf(arrays, shown);
+  const ends = Uint32Array.from({ length: cells }, (_, i) => 4 * (i + 1));
   const head = `<?xml version="1.0"?>
 <VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">
 <UnstructuredGrid><Piece NumberOfPoints="${points}" NumberOfCells="${cells}">
-<PointData Scalars="${plain(name)}">${array(ofType(field, "Float32", "Float64"), plain(name), "", values)}</PointData>
-<Points>${array(ofType(positions, "Float32", "Float64"), "Points", ' NumberOfComponents="3"', places)}</Points>
-<Cells>${array("UInt32", "connectivity", "", corners)}${array("UInt32", "offsets", "", offsets)}${array("UInt8", "types", "", kinds)}</Cells>
+<PointData${scalars ? ` Scalars="${escaped(scalars.name)}"` : ""}>${arrays.map(({ values, name, size }) => array(values, name, size)).join("")}</PointData>
+<Points>${array(positions, "Points", 3)}</Points>
+<Cells>${array(tets, "connectivity")}${array(ends, "offsets")}${array(new Uint8Array(cells).fill(TETRAHEDRON), "types")}</Cells>
 </Piece></UnstructuredGrid>
 <AppendedData encoding="raw">_`;
-  const appended = arrays.flatMap((one) => [BigUint64Array.of(BigInt(one.byteLength)), one]);
   return /** @type {BlobPart[]} */ ([head, ...appended, "</AppendedData></VTKFile>\n"]);
 }
 
@@ -65,11 +125,9 @@ function swapped(array) {
 /**
  * Legacy VTK, binary: numbers have the highest byte first.
  *
- * @param {TetMesh} mesh @param {string} name of the field @returns {BlobPart[]}
+ * @param {TetMesh} mesh @param {number} shown the number of the field that is shown first @returns {BlobPart[]}
  */
-export function vtk(mesh, name) {
-  const { tets } = mesh;
-  const [positions, field] = [absolutePositions(mesh.positions, mesh), absoluteValues(mesh.field, mesh)];
+export function vtk({ positions, tets, fields }, shown) {
   const [points, cells] = [positions.length / 3, tets.length / 4];
   const corners = new Uint32Array(5 * cells);
   for (let i = 0; i < cells; i++) {
@@ -77,15 +135,26 @@ export function vtk(mesh, name) {
     corners.set(tets.subarray(4 * i, 4 * i + 4), 5 * i + 1);
   }
   const types = new Uint32Array(cells).fill(TETRAHEDRON);
+  const all = arraysOf(fields);
+  const names = plain(all.map(({ name }) => name));
+  const arrays = all.map((array, i) => ({ ...array, name: names[i] }));
+  const scalars = arrayOf(arrays, shown);
+  const others = arrays.filter((array) => array !== scalars);
+  const word = (values) => ofType(values, "float", "double");
+  /** @type {BlobPart[]} */
+  const data = [];
+  if (scalars) data.push(`\nSCALARS ${scalars.name} ${word(scalars.values)} 1\nLOOKUP_TABLE default\n`, swapped(scalars.values));
+  if (others.length > 0) data.push(`\nFIELD FieldData ${others.length}`);
+  for (const { name, size, values } of others) data.push(`\n${name} ${size} ${points} ${word(values)}\n`, swapped(values));
   return [
-    `# vtk DataFile Version 3.0\ntetralod\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS ${points} ${ofType(positions, "float", "double")}\n`,
+    `# vtk DataFile Version 3.0\ntetralod\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS ${points} ${word(positions)}\n`,
     swapped(positions),
     `\nCELLS ${cells} ${corners.length}\n`,
     swapped(corners),
     `\nCELL_TYPES ${cells}\n`,
     swapped(types),
-    `\nPOINT_DATA ${points}\nSCALARS ${plain(name)} ${ofType(field, "float", "double")} 1\nLOOKUP_TABLE default\n`,
-    swapped(field),
+    `\nPOINT_DATA ${points}`,
+    ...data,
     "\n",
   ];
 }
@@ -113,14 +182,15 @@ export function stl({ positions, indices, origin }) {
   return [data];
 }
 
-/** PLY, binary, with normals or the value of the field at each vertex. @param {Triangles} surface @returns {BlobPart[]} */
-export function ply(surface) {
-  const { indices, normals, name } = surface;
-  const positions = absolutePositions(surface.positions, surface);
-  const values = surface.values && absoluteValues(surface.values, surface);
+const PLACES = ["x", "y", "z", "nx", "ny", "nz"];
+
+/** PLY, binary, with normals and the fields at each vertex. @param {Surface} surface @returns {BlobPart[]} */
+export function ply({ positions, normals, fields, indices }) {
   const [points, count] = [positions.length / 3, indices.length / 3];
-  /** @type {[array: Float32Array | Float64Array | undefined, names: string[]][]} */
-  const all = [[positions, ["x", "y", "z"]], [normals, ["nx", "ny", "nz"]], [values, [plain(name)]]];
+  const names = plain(fields.map((field) => nameOf(fields, field)), PLACES);
+  /** @type {[array: Numbers | undefined, names: string[]][]} */
+  const all = [[positions, PLACES.slice(0, 3)], [normals, PLACES.slice(3)]];
+  all.push(...fields.map(({ values }, i) => /** @type {[Numbers, string[]]} */ ([values, [names[i]]])));
   const columns = all.flatMap(([array, names]) => (array ? names.map((label, k) => ({ array, label, k, step: names.length })) : []));
   const width = columns.reduce((sum, { array }) => sum + array.BYTES_PER_ELEMENT, 0);
   const vertices = new DataView(new ArrayBuffer(width * points));
@@ -201,7 +271,7 @@ const linear = (channel) => (channel <= 0.04045 ? channel / 12.92 : ((channel + 
 /**
  * The colours that values have on the scale of a legend, as linear light: what glTF has in `COLOR_0`.
  *
- * @param {Stored & { values: Float32Array }} surface
+ * @param {Pick<import("tetralod").Stored, "offset" | "scale"> & { values: Float32Array }} surface
  * @param {Pick<import("tetralod/viewer").Legend, "range" | "log" | "colours">} legend
  */
 export function coloursOf({ values, offset, scale }, { range, log, colours }) {

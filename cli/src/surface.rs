@@ -37,8 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     surface.extract(&answer.opened.session.view());
     let seconds = start.elapsed().as_secs_f64();
     let closed = surface.is_closed();
-    let values = |field: &Vec<f64>| surface.points.iter().map(|p| field[*p as usize]).collect();
-    let fields = answer.point_values(fields.iter().map(values))?;
+    let fields = answer.point_values(fields.iter().map(|field| surface.interpolate(field)))?;
     let data = PolyData { fields, triangles: surface.indices, ..answer.poly_data(surface.positions)? };
     let origin = arguments.output.write(&data)?;
     let report = Report { surface: Amount::of(&data, origin), closed };

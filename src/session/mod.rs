@@ -349,6 +349,12 @@ impl Session {
         Ok(&self.slice)
     }
 
+    /// The isosurfaces and the section as they were last asked for.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn last_surfaces(&self) -> (&IsoSurface, &Slice) {
+        (&self.surface, &self.slice)
+    }
+
     /// One of the fields at the vertices of the current mesh, in field units; empty if there is no such field.
     pub fn values(&self, field: usize) -> Vec<f64> {
         let (Some(mesh), Some(info)) = (self.mesh(), self.info().and_then(|info| info.fields.get(field)))

@@ -56,6 +56,14 @@ impl BoundarySurface {
         *vertex
     }
 
+    /// The value at each vertex of another field of the mesh that the surface was made of, given by one number a point.
+    ///
+    /// # Panics
+    /// If there are fewer numbers than points in that mesh.
+    pub fn interpolate(&self, field: &[f64]) -> Vec<f64> {
+        self.points.iter().map(|p| field[*p as usize]).collect()
+    }
+
     /// The surface's area, in square model units.
     pub fn area(&self) -> f64 {
         area(&self.positions, &self.indices)

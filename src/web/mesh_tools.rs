@@ -7,10 +7,13 @@
 use super::error::WebError;
 use super::places::places;
 use super::stored::Stored;
-use super::tools::{self, JsIsoSurface, JsProfile, JsSlice, JsStats, JsStreamlines, JsSurface, Way};
+use super::tools::{
+    self, JsIsoSurface, JsProfile, JsSlice, JsStats, JsStreamlines, JsSurface, Way, put_fields,
+};
 use crate::mt::MeshChanges;
 use crate::session::MeshFollower;
 use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice};
+use js_sys::Float64Array;
 use std::ops::Range;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -80,8 +83,14 @@ impl MeshTools {
         places(&self.mesh.view())
     }
 
-    /// The isosurfaces of the mesh at some values, as one; with normals of the field's gradient or of the triangles.
-    pub fn isosurfaces(&mut self, values: &[f64], smooth: bool) -> Result<JsIsoSurface, WebError> {
+    /// The isosurfaces of the mesh at some values, as one; with normals of the field's gradient or of the triangles, and with the
+    /// values of other fields, given at the points.
+    pub fn isosurfaces(
+        &mut self,
+        values: &[f64],
+        smooth: bool,
+        fields: Vec<Float64Array>,
+    ) -> Result<JsIsoSurface, WebError> {
         if !values.iter().all(|value| value.is_finite()) {
             return Err(WebError::new("bad-option", "the isovalue must be a finite number".to_owned()));
         }
@@ -89,11 +98,18 @@ impl MeshTools {
         let mesh = self.mesh.view();
         let MeshChanges { vertices, tets } = self.surface_behind.take(mesh.positions.len(), mesh.tets.len());
         self.surface.update(&mesh, values, &vertices, &tets);
-        Ok(tools::iso_surface(&self.surface, &self.stored))
+        let js = tools::iso_surface(&self.surface, &self.stored);
+        put_fields(js.as_ref(), fields.iter().map(|field| self.surface.interpolate(&mesh, &field.to_vec())));
+        Ok(js)
     }
 
-    /// The section of the mesh with the plane `normal · p = offset`.
-    pub fn slice(&mut self, normal: &[f64], offset: f64) -> Result<JsSlice, WebError> {
+    /// The section of the mesh with the plane `normal · p = offset`, with the values of other fields.
+    pub fn slice(
+        &mut self,
+        normal: &[f64],
+        offset: f64,
+        fields: Vec<Float64Array>,
+    ) -> Result<JsSlice, WebError> {
         let plane = tools::plane(normal, offset)?;
         let mesh = self.mesh.view();
         let MeshChanges { vertices, tets } = self.slice_behind.take(mesh.positions.len(), mesh.tets.len());
@@ -102,12 +118,14 @@ impl MeshTools {
         } else {
             self.slice.extract(&mesh, &plane);
         }
-        Ok(tools::section(&self.slice, &self.stored))
+        let js = tools::section(&self.slice, &self.stored);
+        put_fields(js.as_ref(), fields.iter().map(|field| self.slice.interpolate(&mesh, &field.to_vec())));
+        Ok(js)
     }
 
-    /// The boundary of the mesh.
-    pub fn surface(&self) -> JsSurface {
-        tools::boundary(&self.mesh.view(), &self.stored)
+    /// The boundary of the mesh, with the values of other fields.
+    pub fn surface(&self, fields: Vec<Float64Array>) -> JsSurface {
+        tools::boundary(&self.mesh.view(), fields.iter().map(Float64Array::to_vec), &self.stored)
     }
 
     /// The field at some points, three coordinates each; NaN outside of the mesh.

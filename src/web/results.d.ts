@@ -184,6 +184,8 @@ export interface Mesh extends Stored {
   positions: Float32Array;
   /** One value a vertex, relative to `offset`: `offset + scale * v` in field units. */
   field: Float32Array;
+  /** The fields that were asked for with `fields`; none unless some were. */
+  fields: FieldValues[];
   /** Four vertices a tetrahedron, positive: (b - a) x (c - a) . (d - a) > 0. */
   tets: Uint32Array;
   /** Four tetrahedra a tetrahedron: the i-th lies across from its i-th vertex; 0xffffffff at the boundary. */

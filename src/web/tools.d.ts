@@ -11,12 +11,33 @@ export interface Stored {
   scale: number;
 }
 
+/**
+ * A field of the volume at the vertices of a mesh or a surface, and what `info.fields` says of it. Each field has an `offset` and a `scale` of
+ * its own.
+ */
+export interface FieldValues {
+  /** Its number in `info.fields`. */
+  index: number;
+  name: string;
+  unit: string;
+  /** The time that the values are of. Time steps of one field are fields of one name. */
+  time: number | undefined;
+  /** Which component of which vector or tensor it is, from 0, if it is one; without a number its length. */
+  vector: { name: string; component: number | undefined } | undefined;
+  /** One value a vertex, in the order of the vertices: `offset + scale * v` in field units. */
+  values: Float32Array;
+  offset: number;
+  scale: number;
+}
+
 /** Triangles with one value a vertex. */
 export interface Surface extends Stored {
   /** Three coordinates a vertex, relative to `origin`. */
   positions: Float32Array;
   /** One value a vertex, relative to `offset`. */
   values: Float32Array;
+  /** The fields that were asked for with `fields`, interpolated linearly in each tetrahedron; none unless some were. */
+  fields: FieldValues[];
   /** Three vertices a triangle, counter-clockwise when seen from the side that they face. */
   indices: Uint32Array;
 }

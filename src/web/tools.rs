@@ -61,11 +61,19 @@ pub fn section(slice: &Slice, stored: &Stored) -> JsSlice {
     js.unchecked_into()
 }
 
-/// The boundary of `mesh`.
-pub fn boundary(mesh: &MeshView<'_>, stored: &Stored) -> JsSurface {
+/// The boundary of `mesh`, with the values of other fields, given at the points of the mesh.
+pub fn boundary(mesh: &MeshView<'_>, fields: impl Iterator<Item = Vec<f64>>, stored: &Stored) -> JsSurface {
     let mut boundary = BoundarySurface::new();
     boundary.extract(mesh);
-    triangles(&boundary.positions, &boundary.values, &boundary.indices, stored).unchecked_into()
+    let js = triangles(&boundary.positions, &boundary.values, &boundary.indices, stored);
+    put_fields(&js, fields.map(|field| boundary.interpolate(&field)));
+    js.unchecked_into()
+}
+
+/// Puts the values of other fields at the vertices of a surface beside it, in double precision: the package stores them as each needs it.
+pub fn put_fields(surface: &JsValue, fields: impl Iterator<Item = Vec<f64>>) {
+    let arrays: Array = fields.map(|values| doubles(&values)).collect();
+    set(surface, "fields", &arrays);
 }
 
 /// The field at some points, three coordinates each; NaN outside of the mesh.

@@ -2,32 +2,56 @@
 
 use super::error::WebError;
 use super::options::field_index;
-use super::tools::{self, JsIsoSurface, JsProfile, JsSlice, JsStats, JsStreamlines, JsSurface, Way};
+use super::tools::{
+    self, JsIsoSurface, JsProfile, JsSlice, JsStats, JsStreamlines, JsSurface, Way, put_fields,
+};
 use super::viewer::Viewer;
 use crate::view::NormalKind;
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen]
 impl Viewer {
-    /// The isosurfaces of the current mesh at some values, as one; with normals of the field's gradient or of the triangles.
-    pub fn isosurfaces(&mut self, values: &[f64], smooth: bool) -> Result<JsIsoSurface, WebError> {
+    /// The isosurfaces of the current mesh at some values, as one; with normals of the field's gradient or of the triangles, and with
+    /// the values of other fields, given by their numbers.
+    pub fn isosurfaces(
+        &mut self,
+        values: &[f64],
+        smooth: bool,
+        fields: &[usize],
+    ) -> Result<JsIsoSurface, WebError> {
         let session = self.file.session_mut();
         session.set_normal_kind(if smooth { NormalKind::Smooth } else { NormalKind::Gradient });
-        let stored = self.file.stored()?;
-        Ok(tools::iso_surface(self.file.session_mut().isosurfaces(values)?, &stored))
+        session.isosurfaces(values)?;
+        let (session, stored) = (self.file.session(), self.file.stored()?);
+        let (surface, mesh) = (session.last_surfaces().0, session.last_view());
+        let js = tools::iso_surface(surface, &stored);
+        put_fields(js.as_ref(), self.all_values(fields)?.map(|field| surface.interpolate(&mesh, &field)));
+        Ok(js)
     }
 
-    /// The section of the current mesh with the plane `normal · p = offset`.
-    pub fn slice(&mut self, normal: &[f64], offset: f64) -> Result<JsSlice, WebError> {
+    /// The section of the current mesh with the plane `normal · p = offset`, with the values of other fields.
+    pub fn slice(&mut self, normal: &[f64], offset: f64, fields: &[usize]) -> Result<JsSlice, WebError> {
         let plane = tools::plane(normal, offset)?;
-        let stored = self.file.stored()?;
-        Ok(tools::section(self.file.session_mut().slice(&plane)?, &stored))
+        self.file.session_mut().slice(&plane)?;
+        let (session, stored) = (self.file.session(), self.file.stored()?);
+        let (slice, mesh) = (session.last_surfaces().1, session.last_view());
+        let js = tools::section(slice, &stored);
+        put_fields(js.as_ref(), self.all_values(fields)?.map(|field| slice.interpolate(&mesh, &field)));
+        Ok(js)
     }
 
-    /// The boundary of the current mesh.
-    pub fn surface(&mut self) -> Result<JsSurface, WebError> {
-        let stored = self.file.stored()?;
-        Ok(tools::boundary(&self.file.session_mut().view(), &stored))
+    /// The boundary of the current mesh, with the values of other fields.
+    pub fn surface(&mut self, fields: &[usize]) -> Result<JsSurface, WebError> {
+        self.file.session_mut().view();
+        let (fields, stored) = (self.all_values(fields)?, self.file.stored()?);
+        Ok(tools::boundary(&self.file.session().last_view(), fields, &stored))
+    }
+
+    /// A field at the points of the current mesh, by name or number.
+    pub fn values(&self, field: &JsValue) -> Result<Vec<f64>, WebError> {
+        let index = field_index(self.file.info()?, field)?;
+        Ok(self.file.session().values(index))
     }
 
     /// The field at some points, three coordinates each; NaN outside of the mesh.
@@ -78,5 +102,16 @@ impl Viewer {
     /// A hash of the current mesh, the same wherever the same request was made.
     pub fn hash(&self) -> String {
         self.file.hash()
+    }
+}
+
+impl Viewer {
+    /// Fields at the points of the current mesh, by their numbers. Another volume may have come since these were looked up.
+    fn all_values(&self, fields: &[usize]) -> Result<impl Iterator<Item = Vec<f64>>, WebError> {
+        let info = self.file.info()?;
+        for field in fields {
+            field_index(info, &(*field).into())?;
+        }
+        Ok(fields.iter().map(|field| self.file.session().values(*field)))
     }
 }

@@ -34,6 +34,7 @@ const FILES = [
   "ranges.js",
   "rpc.js",
   "start.js",
+  "stored.js",
   "stream.js",
   "surfaces.js",
   "tetralod_build.d.ts",

@@ -5,7 +5,7 @@ import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { after, before, describe, test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { MultiTessellation, TetralodError } from "../../pkg/index.js";
+import { MultiTessellation, TetralodError, absolute } from "../../pkg/index.js";
 import { Viewer } from "../../pkg/viewer.js";
 import { rejects } from "./rejects.js";
 
@@ -219,6 +219,51 @@ for (const worker of [true, false]) {
       await rejects(mt.stats({ bins: 0 }), "bad-option");
       await rejects(mt.stats({ range: [1, 0] }), "bad-option");
       await rejects(mt.isosurface(0.5, /** @type {any} */ ({ normals: "flat" })), "bad-option");
+      mt.free();
+    });
+
+    test("all fields come with meshes and surfaces", async () => {
+      const mt = await open(new Uint8Array(await readFile(`${folder}/fields.mt`)));
+      await mt.complete;
+      const needs = [{ error: "2%", field: 1 }];
+      const request = { needs, field: 1 };
+      const mesh = await mt.refine(request, { fields: true });
+      const all = mt.info.fields;
+      assert.ok(all.length > 1);
+      assert.deepEqual(mesh.fields.map(({ values, ...field }) => field), all.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale })));
+      assert.deepEqual(mesh.fields[1].values, mesh.field);
+      for (const { index, values } of mesh.fields) {
+        assert.deepEqual(values, (await mt.refine({ needs, field: index })).field);
+      }
+
+      await mt.refine(request);
+      const [x0, y0, z0, x1] = mt.info.bounds;
+      const { min, max } = all[1];
+      const how = { fields: [1, all[0].name] };
+      const slice = await mt.slice([1, 0.2, 0.1], x0 + 0.3 * (x1 - x0) + 0.2 * y0 + 0.1 * z0, how);
+      const surfaces = { slice, isosurface: await mt.isosurface([0.3, 0.6].map((part) => min + part * (max - min)), how), boundary: await mt.surface(how) };
+      for (const [name, surface] of Object.entries(surfaces)) {
+        const { positions, values, fields } = absolute(surface);
+        assert.ok(values.length > 50, name);
+        assert.deepEqual(fields.map(({ index }) => index), [1, 0], name);
+        for (const field of fields) {
+          await mt.setField(field.index);
+          const probed = await mt.probe(positions);
+          const near = 1e-5 * (all[field.index].max - all[field.index].min);
+          // Vertices are rounded to single precision: some are outside then.
+          const inside = [...probed.keys()].filter((i) => !Number.isNaN(probed[i]));
+          assert.ok(inside.length > 0.9 * values.length, `${name}: ${inside.length} of ${values.length}`);
+          for (const i of inside) assert.ok(Math.abs(field.values[i] - probed[i]) < near, `${name}: ${field.values[i]}, ${probed[i]}`);
+        }
+        assert.ok(values.every((value, i) => Math.abs(value - fields[0].values[i]) < 1e-6 * (max - min)), name);
+        await mt.setField(1);
+      }
+
+      assert.deepEqual([(await mt.surface()).fields, (await mt.refine(request)).fields], [[], []]);
+      const aside = await mt.surface({ fields: [0], request: { error: "50%" } });
+      assert.equal(aside.fields[0].values.length, aside.values.length);
+      await rejects(mt.surface({ fields: ["none"] }), "bad-option", /none/);
+      await rejects(mt.refine(request, /** @type {any} */ ({ fields: true, deltas: true })), "bad-option", /`fields`/);
       mt.free();
     });
 

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { applyChanges, emptyMesh } from "../../pkg-template/changes.js";
-import { absolute } from "../../pkg-template/surfaces.js";
+import { absolute, fieldsOf, withFields } from "../../pkg-template/stored.js";
 
 // By their addresses: the declarations beside them name types of libraries that are not here.
 const adapter = (name) => import(new URL(`../../pkg-template/${name}.js`, import.meta.url).href);
@@ -28,6 +28,29 @@ test("absolute numbers are copies in double precision only where they must be", 
   assert.deepEqual([...far.positions], places);
   assert.deepEqual([...far.values], values);
   assert.equal(absolute({ positions: triangle.positions, ...NEAR }).values, undefined);
+  assert.deepEqual([far.origin, far.offset, far.scale], [NEAR.origin, NEAR.offset, NEAR.scale]);
+  assert.equal(far.indices, triangle.indices);
+  const { field } = absolute({ positions: triangle.positions, field: triangle.values, ...FAR });
+  assert.deepEqual([...field], values);
+});
+
+test("fields are stored each in its own way, and absolute again", () => {
+  const own = (name, offset, scale) => ({ name, unit: "", time: undefined, vector: undefined, offset, scale, min: 0, max: 1 });
+  const info = /** @type {any} */ ({ fields: [own("p", 0, 1), own("t", FAR.offset, FAR.scale), own("p", 0, 1)] });
+  const numbersOf = (wanted) => fieldsOf(info, wanted).map(({ index }) => index);
+  assert.deepEqual([undefined, false, true, [], ["t", "p", 2]].map(numbersOf), [[], [], [0, 1, 2], [], [1, 0, 2]]);
+  for (const wrong of [["q"], [3], ["p", null], "p", 1]) {
+    assert.throws(() => fieldsOf(info, /** @type {any} */ (wrong)), { code: "bad-option", message: /`fields`/ });
+  }
+  assert.throws(() => fieldsOf(undefined, true), { code: "not-ready" });
+
+  const wanted = fieldsOf(info, ["t", "p"]);
+  const stored = withFields({ ...triangle, ...NEAR }, wanted, [values, triangle.values].map((numbers) => Float64Array.from(numbers)));
+  assert.deepEqual(stored.fields.map(({ index, name }) => [index, name]), [[1, "t"], [0, "p"]]);
+  for (const field of stored.fields) assert.deepEqual(field.values, triangle.values);
+  const [t, p] = absolute(stored).fields;
+  assert.deepEqual([[...t.values], t.offset, t.scale], [values, 0, 1]);
+  assert.equal(p.values, stored.fields[1].values);
 });
 
 test("meshes that are kept up know what they are relative to", () => {
@@ -44,8 +67,8 @@ test("meshes that are kept up know what they are relative to", () => {
   };
   const empty = emptyMesh();
   assert.deepEqual([empty.origin, empty.offset, empty.scale], [[0, 0, 0], 0, 1]);
-  const { origin, offset, scale } = applyChanges(empty, delta);
-  assert.deepEqual({ origin, offset, scale }, FAR);
+  const { origin, offset, scale, fields } = applyChanges({ ...empty, fields: [/** @type {any} */ ({})] }, delta);
+  assert.deepEqual({ origin, offset, scale, fields }, { ...FAR, fields: [] });
 });
 
 /** As much of three.js as an adapter takes. */

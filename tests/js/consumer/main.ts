@@ -2,6 +2,7 @@
 import {
   MultiTessellation,
   TetralodError,
+  absolute,
   applyChanges,
   emptyMesh,
   type ErrorCode,
@@ -34,6 +35,8 @@ const request: RefineOptions = { error: "1%", maxTets: 10_000, box: new Float64A
 const mesh: RefineResult = await mt.refine(request);
 const positions: Float32Array = mesh.positions;
 const surface: IsoSurface = await mt.isosurface((info.fields[0]!.min + info.fields[0]!.max) / 2);
+const { fields: onIt } = absolute(await mt.isosurface(0.5, { fields: true }));
+onIt satisfies { name: string; values: Float32Array | Float64Array }[];
 const hash: string = await mt.hash();
 
 // What three.js has, without three.js.

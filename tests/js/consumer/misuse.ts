@@ -16,6 +16,8 @@ export async function misuse(mt: MultiTessellation): Promise<void> {
   (await mt.refine({}, { arrays: ["tets"] })).positions;
   // @ts-expect-error a mesh has no such array
   await mt.refine({}, { arrays: ["normals"] });
+  // @ts-expect-error a delta has no fields
+  await mt.refine({}, { deltas: true, fields: true });
   // @ts-expect-error there is no such event
   mt.addEventListener("stats", ({ detail }) => detail.bytes);
   // @ts-expect-error an isovalue is a number

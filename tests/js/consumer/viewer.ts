@@ -3,6 +3,7 @@ import type { LineProfile, Mesh, MtInfo } from "tetralod";
 import {
   TetralodError,
   Viewer,
+  absolute,
   type BlockMap,
   type Misfit,
   type OpenedVolume,
@@ -40,8 +41,9 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   dropped.map(({ part, problem }: Misfit) => `${part}: ${problem}`) satisfies string[];
   await viewer.refine({ error: "1%" }, { signal });
   await Promise.all([viewer.settled({ signal }), viewer.isosurface(0.5, { signal }), viewer.screenshot({ signal })]);
-  const whole: Mesh = await viewer.mesh();
+  const whole: Mesh = await viewer.mesh({ fields: true });
   whole.tets satisfies Uint32Array;
+  absolute(whole).fields[0]?.values satisfies Float32Array | Float64Array | undefined;
   const known: MtInfo | undefined = viewer.info ?? info;
   for (const request of requests) (await viewer.refine(request)) satisfies ViewerStats;
   const value: number = known.fields[0]?.min ?? 0;

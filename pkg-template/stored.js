@@ -1,0 +1,48 @@
+/** How numbers are stored in arrays of single precision: fields that are asked for, and absolute numbers of all of them. */
+
+import { TetralodError } from "./errors.js";
+
+/**
+ * What `info` says of the fields that `wanted` names, or has numbers of; of all with `true`.
+ *
+ * @param {import("./index.js").MtInfo | undefined} info
+ * @param {boolean | readonly (string | number)[]} [wanted]
+ */
+export function fieldsOf(info, wanted = false) {
+  if (wanted === false) return [];
+  if (!info) throw new TetralodError("not-ready", "the base mesh has not arrived yet");
+  const all = info.fields.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale }));
+  if (wanted === true) return all;
+  if (!Array.isArray(wanted)) throw new TetralodError("bad-option", "option `fields`: must be true, or a list of names or numbers");
+  return wanted.map((field) => {
+    const found = all.find(({ index, name }) => field === index || field === name);
+    if (found) return found;
+    throw new TetralodError("bad-option", `option \`fields\`: there is no field ${field}, only ${all.map(({ name }) => name).join(", ")}`);
+  });
+}
+
+/**
+ * Puts fields beside a mesh or a surface, each as it is stored in single precision.
+ *
+ * @template {object} T
+ * @param {T} result
+ * @param {ReturnType<typeof fieldsOf>} fields
+ * @param {Float64Array[]} arrays their values at its vertices
+ */
+export function withFields(result, fields, arrays) {
+  const single = (values, { offset, scale }) => Float32Array.from(values, (value) => (value - offset) / scale);
+  return Object.assign(result, { fields: fields.map((field, i) => ({ ...field, values: single(arrays[i], field) })) });
+}
+
+/** The arrays of a result in absolute numbers: themselves where they are, else copies in double precision. */
+export function absolute(stored) {
+  const { positions, fields, origin, offset, scale } = stored;
+  const found = { ...stored, offset: 0, scale: 1 };
+  if (origin) found.origin = [0, 0, 0];
+  if (positions && origin.some((x) => x !== 0)) found.positions = Float64Array.from(positions, (x, i) => origin[i % 3] + x);
+  for (const name of ["values", "field"]) {
+    if (stored[name] && (offset !== 0 || scale !== 1)) found[name] = Float64Array.from(stored[name], (v) => offset + scale * v);
+  }
+  if (fields) found.fields = fields.map(absolute);
+  return found;
+}
