@@ -55,7 +55,7 @@ async function legend() {
 /** The triangles that are chosen, with the colours that their values have. */
 async function coloured() {
   const [surface, colours] = [await triangles(), await legend()];
-  return colours ? { ...surface, colours: coloursOf(surface, colours) } : surface;
+  return colours ? { ...surface, colours: coloursOf(absolute(surface).values, colours) } : surface;
 }
 
 /** The values at the probes, and along the line between two of them. */

@@ -271,16 +271,16 @@ const linear = (channel) => (channel <= 0.04045 ? channel / 12.92 : ((channel + 
 /**
  * The colours that values have on the scale of a legend, as linear light: what glTF has in `COLOR_0`.
  *
- * @param {Pick<import("tetralod").Stored, "offset" | "scale"> & { values: Float32Array }} surface
+ * @param {Numbers} values in units of the field
  * @param {Pick<import("tetralod/viewer").Legend, "range" | "log" | "colours">} legend
  */
-export function coloursOf({ values, offset, scale }, { range, log, colours }) {
+export function coloursOf(values, { range, log, colours }) {
   const even = (value) => (log ? Math.log(value) : value);
   const [low, high] = range.map(even);
   const table = colours.map((colour) => [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16) / 255));
   const found = new Float32Array(3 * values.length);
-  values.forEach((stored, i) => {
-    const part = high > low ? (even(offset + scale * stored) - low) / (high - low) : 0.5;
+  values.forEach((value, i) => {
+    const part = high > low ? (even(value) - low) / (high - low) : 0.5;
     // Logarithms of what is not positive are at the lower end.
     const place = Math.min(Math.max(part || 0, 0), 1) * (table.length - 1);
     const below = Math.min(Math.floor(place), table.length - 2);
