@@ -5,8 +5,8 @@
 /** @typedef {{ positions: Numbers, fields: Field[], tets: Uint32Array }} TetMesh in absolute numbers */
 /** @typedef {{ positions: Numbers, fields: Field[], indices: Uint32Array, normals?: Float32Array }} Surface in absolute numbers */
 /**
- * @typedef {import("tetralod").Stored & { positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array,
- *   colours?: Float32Array }} Triangles colours are three numbers a vertex: linear light, 0 to 1
+ * @typedef {{ positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array, colours?: Float32Array,
+ *   origin: number[], offset: number, scale: number }} Triangles colours are three numbers a vertex: linear light, 0 to 1
  */
 
 const TETRAHEDRON = 10;
@@ -46,8 +46,8 @@ function componentsOf(fields) {
   return count > 1 && fields.slice(0, count).every(isNamed) ? count : 1;
 }
 
-/** The name of a field or its vector, with the time where there are several. @param {Field[]} fields @param {Field} field */
-function nameOf(fields, { name, time }, own = name) {
+/** The name of a field, or `own` for its vector, with the time where there are several. @param {Field[]} fields @param {Field} field */
+function nameAtTime(fields, { name, time }, own = name) {
   const several = fields.some((other) => other.name === name && other.time !== time);
   return several && time !== undefined ? `${own}@${Number.isInteger(time) ? `${time}.0` : time}` : own;
 }
@@ -57,7 +57,11 @@ function interleaved(fields) {
   const count = fields.length;
   if (count === 1) return fields[0].values;
   const Floats = fields.some(({ values }) => values instanceof Float64Array) ? Float64Array : Float32Array;
-  return Floats.from({ length: count * fields[0].values.length }, (_, i) => fields[i % count].values[Math.floor(i / count)]);
+  const found = new Floats(count * fields[0].values.length);
+  fields.forEach(({ values }, k) => {
+    for (let i = 0; i < values.length; i++) found[count * i + k] = values[i];
+  });
+  return found;
 }
 
 /**
@@ -75,7 +79,7 @@ function arraysOf(fields) {
     const { vector, time } = field;
     const isOf = (array) => array.size > 1 && array.field.vector.name === vector.name && array.field.time === time;
     if (vector && vector.component === undefined && arrays.some(isOf)) continue;
-    const name = nameOf(fields, field, size > 1 ? vector?.name : undefined);
+    const name = nameAtTime(fields, field, size > 1 ? vector?.name : undefined);
     arrays.push({ name, size, values: interleaved(fields.slice(i, i + size)), field });
   }
   return arrays;
@@ -187,7 +191,7 @@ const PLACES = ["x", "y", "z", "nx", "ny", "nz"];
 /** PLY, binary, with normals and the fields at each vertex. @param {Surface} surface @returns {BlobPart[]} */
 export function ply({ positions, normals, fields, indices }) {
   const [points, count] = [positions.length / 3, indices.length / 3];
-  const names = plain(fields.map((field) => nameOf(fields, field)), PLACES);
+  const names = plain(fields.map((field) => nameAtTime(fields, field)), PLACES);
   /** @type {[array: Numbers | undefined, names: string[]][]} */
   const all = [[positions, PLACES.slice(0, 3)], [normals, PLACES.slice(3)]];
   all.push(...fields.map(({ values }, i) => /** @type {[Numbers, string[]]} */ ([values, [names[i]]])));

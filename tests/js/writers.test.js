@@ -95,7 +95,7 @@ test("meshes are saved with all fields: components as vectors, times in the name
     ["a_b 1", "FIELD FieldData 5\n", "x 1", "u 3", "T_0_5 1", "T_2_0 1", "a_b_1 1"],
   );
   const data = heads.map(({ 0: head, index }) => read(bytes, index + head.length, head.startsWith("u ") ? 15 : 5, "FloatBE"));
-  assert.deepEqual(data.toSpliced(1, 1), [values(7), values(0), vector, values(5), values(6), values(8)]);
+  assert.deepEqual([data[0], ...data.slice(2)], [values(7), values(0), vector, values(5), values(6), values(8)]);
 });
 
 test("components of which one is missing, or that are named otherwise, stay scalars", async () => {
