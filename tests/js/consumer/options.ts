@@ -4,6 +4,7 @@ import {
   type BlockProgress,
   type ErrorCurve,
   type FieldInfo,
+  type FieldValues,
   type MtInfo,
   type Need,
   type OpenOptions,
@@ -69,6 +70,7 @@ const steps: Examples<StepOptions> = {
 const results: Examples<ResultOptions> = {
   partial: { partial: true },
   arrays: { arrays: ["field"] },
+  fields: { fields: [0] },
   zeroCopy: { zeroCopy: true },
   signal: { signal: new AbortController().signal },
 };
@@ -143,6 +145,17 @@ const fields: Members<FieldInfo> = {
   curve: "object",
 };
 
+const values: Members<FieldValues> = {
+  index: "number",
+  name: "string",
+  unit: "string",
+  time: "number undefined",
+  vector: "object undefined",
+  values: "object",
+  offset: "number",
+  scale: "number",
+};
+
 const curves: Members<ErrorCurve> = {
   errors: "object",
   bytes: "object",
@@ -199,7 +212,10 @@ export async function checkOptions(source: URL): Promise<void> {
     hasMembers("stats", done, stats);
   }
   for (const how of Object.values(results)) {
-    if (!(await mt.refine({ error: "5%" }, how)).stats.done) throw new Error("not done");
+    const { stats: done, fields: found } = await mt.refine({ error: "5%" }, how);
+    if (!done.done) throw new Error("not done");
+    for (const field of found) hasMembers("values", field, values);
+    if (how.fields && found.length === 0) throw new Error("there are no fields");
   }
   // Each from another mesh, so that there are steps.
   for (const [i, options] of Object.values(steps).entries()) {
