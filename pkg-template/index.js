@@ -108,7 +108,7 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
     checkNames(how, ["deltas", "partial", "arrays", "fields", "zeroCopy", "signal"]);
     const { deltas = false, partial = false, zeroCopy = false, signal } = how;
     signal?.throwIfAborted();
-    const fields = fieldsOf(this.#info, how.fields);
+    const fields = fieldsOf(() => this.#info, how.fields);
     if (deltas && fields.length > 0) throw new TetralodError("bad-option", `option \`fields\`: ${NO_FIELDS}`);
     if (zeroCopy && (this.#inWorker || deltas)) throw new TetralodError("bad-option", `option \`zeroCopy\`: ${NO_ZERO_COPY}`);
     const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays), fields, zeroCopy: Boolean(zeroCopy) };

@@ -3,15 +3,16 @@
 import { TetralodError } from "./errors.js";
 
 /**
- * What `info` says of the fields that `wanted` names, or has numbers of; of all with `true`.
+ * What is known of the fields that `wanted` names, or has numbers of; of all with `true`.
  *
- * @param {import("./index.js").MtInfo | undefined} info
+ * @param {() => import("./index.js").MtInfo} info
  * @param {boolean | readonly (string | number)[]} [wanted]
  */
 export function fieldsOf(info, wanted = false) {
   if (wanted === false) return [];
-  if (!info) throw new TetralodError("not-ready", "the base mesh has not arrived yet");
-  const all = info.fields.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale }));
+  const known = info();
+  if (!known) throw new TetralodError("not-ready", "the base mesh has not arrived yet");
+  const all = known.fields.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale }));
   if (wanted === true) return all;
   if (!Array.isArray(wanted)) throw new TetralodError("bad-option", "option `fields`: must be true, or a list of names or numbers");
   return wanted.map((field) => {
@@ -36,13 +37,12 @@ export function withFields(result, fields, arrays) {
 
 /** The arrays of a result in absolute numbers: themselves where they are, else copies in double precision. */
 export function absolute(stored) {
-  const { positions, fields, origin, offset, scale } = stored;
+  const { origin, offset, scale } = stored;
   const found = { ...stored, offset: 0, scale: 1 };
+  const copy = (name, number) => found[name] && (found[name] = Float64Array.from(found[name], number));
+  if (offset !== 0 || scale !== 1) for (const name of ["values", "field"]) copy(name, (v) => offset + scale * v);
   if (origin) found.origin = [0, 0, 0];
-  if (positions && origin.some((x) => x !== 0)) found.positions = Float64Array.from(positions, (x, i) => origin[i % 3] + x);
-  for (const name of ["values", "field"]) {
-    if (stored[name] && (offset !== 0 || scale !== 1)) found[name] = Float64Array.from(stored[name], (v) => offset + scale * v);
-  }
-  if (fields) found.fields = fields.map(absolute);
+  if (origin?.some(Boolean)) copy("positions", (x, i) => origin[i % 3] + x);
+  if (found.fields) found.fields = found.fields.map(absolute);
   return found;
 }

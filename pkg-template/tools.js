@@ -29,23 +29,23 @@ export const withMeshTools = (Base) =>
   class extends Base {
     async isosurface(values, how = {}) {
       checkNames(how, ["normals", "fields", "request", "signal"]);
-      const { normals = "gradient", fields } = how;
+      const { normals = "gradient" } = how;
       if (normals !== "gradient" && normals !== "smooth") {
         throw new TetralodError("bad-option", 'option `normals`: must be "gradient" or "smooth"');
       }
       const list = typeof values === "number" ? [values] : values;
-      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth", fieldsOf(this.info, fields)], how);
+      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth", how.fields], how);
     }
 
     async slice(normal, offset, how = {}) {
       checkNames(how, ["fields", "request", "signal"]);
       if (typeof offset !== "number") throw new TetralodError("bad-option", "option `offset`: must be a number");
-      return call(this, "slice", [numbers("normal", normal), offset, fieldsOf(this.info, how.fields)], how);
+      return call(this, "slice", [numbers("normal", normal), offset, how.fields], how);
     }
 
     async surface(how = {}) {
       checkNames(how, ["fields", "request", "signal"]);
-      return call(this, "surface", [fieldsOf(this.info, how.fields)], how);
+      return call(this, "surface", [how.fields], how);
     }
 
     async probe(points, how = {}) {
@@ -83,10 +83,12 @@ export const withMeshTools = (Base) =>
     }
   };
 
-const numbersOf = (fields) => fields.map(({ index }) => index);
-
-/** A surface with its arrays of fields as they are stored. */
-const onSurface = (fields, surface) => withFields(surface, fields, surface.fields);
+/** The surface that `make` makes with the fields of some numbers, these as they are stored. */
+function surfaceOf(session, wanted, make) {
+  const fields = fieldsOf(() => session.info(), wanted);
+  const surface = make(fields.map(({ index }) => index));
+  return withFields(surface, fields, surface.fields);
+}
 
 /**
  * The calls in the worker; `session` gives the object of the wasm module that answers them.
@@ -94,9 +96,9 @@ const onSurface = (fields, surface) => withFields(surface, fields, surface.field
  * @param {() => any} session
  */
 export const meshToolMethods = (session) => ({
-  isosurface: (values, smooth, fields) => onSurface(fields, session().isosurfaces(values, smooth, numbersOf(fields))),
-  slice: (normal, offset, fields) => onSurface(fields, session().slice(normal, offset, numbersOf(fields))),
-  surface: (fields) => onSurface(fields, session().surface(numbersOf(fields))),
+  isosurface: (values, smooth, wanted) => surfaceOf(session(), wanted, (fields) => session().isosurfaces(values, smooth, fields)),
+  slice: (normal, offset, wanted) => surfaceOf(session(), wanted, (fields) => session().slice(normal, offset, fields)),
+  surface: (wanted) => surfaceOf(session(), wanted, (fields) => session().surface(fields)),
   probe: (points) => session().probe(points),
   line: (from, to) => session().line(from, to),
   streamlines: (fields, seeds, backward, maxLength, maxSteps) =>
@@ -113,11 +115,11 @@ export const meshToolMethods = (session) => ({
  */
 export const copyToolMethods = (session, tools) => {
   const values = (field) => session().values(field);
-  const arrays = (fields) => numbersOf(fields).map(values);
+  const surface = (wanted, make) => tools((on) => surfaceOf(session(), wanted, (fields) => make(on, fields.map(values))));
   return {
-    isosurface: (at, smooth, fields) => tools((on) => onSurface(fields, on.isosurfaces(at, smooth, arrays(fields)))),
-    slice: (normal, offset, fields) => tools((on) => onSurface(fields, on.slice(normal, offset, arrays(fields)))),
-    surface: (fields) => tools((on) => onSurface(fields, on.surface(arrays(fields)))),
+    isosurface: (at, smooth, wanted) => surface(wanted, (on, fields) => on.isosurfaces(at, smooth, fields)),
+    slice: (normal, offset, wanted) => surface(wanted, (on, fields) => on.slice(normal, offset, fields)),
+    surface: (wanted) => surface(wanted, (on, fields) => on.surface(fields)),
     probe: (points) => tools((on) => on.probe(points)),
     line: (from, to) => tools((on) => on.line(from, to)),
     streamlines: (fields, ...how) => tools((on) => on.streamlines(...fields.map(values), ...how)),

@@ -12,7 +12,7 @@ import { received } from "./options.js";
 import { Parts } from "./parts.js";
 import { serve, webEndpoint } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
-import { withFields } from "./stored.js";
+import { fieldsOf, withFields } from "./stored.js";
 import { limitOf, meshToolMethods } from "./tools.js";
 import { VERSION } from "./version.js";
 
@@ -320,7 +320,10 @@ const methods = {
     }
   },
 
-  mesh: (fields) => withFields(viewer.mesh(), fields, fields.map(({ index }) => viewer.values(index))),
+  mesh(wanted) {
+    const fields = fieldsOf(() => viewer.info(), wanted);
+    return withFields(viewer.mesh(), fields, fields.map(({ index }) => viewer.values(index)));
+  },
 
   /** Where the blocks of the file are, and which of them are here; nothing where it has none. */
   blockMap() {

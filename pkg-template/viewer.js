@@ -10,7 +10,6 @@ import { changedScene } from "./fit.js";
 import { Latest, deferred, mergeUpdates } from "./latest.js";
 import { openOptions, sendable } from "./options.js";
 import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
-import { fieldsOf } from "./stored.js";
 import { abortable, openSource, pump, rangesOf } from "./stream.js";
 import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
@@ -492,9 +491,9 @@ export class Viewer extends withMeshTools(EventTarget) {
   }
 
   /** A copy of the mesh that is shown. */
-  async mesh({ fields, ...others } = /** @type {any} */ ({})) {
-    checkNames(others, [], ["fields"]);
-    return this.#remote.call("mesh", [fieldsOf(this.#info, fields)]);
+  async mesh(how = /** @type {any} */ ({})) {
+    checkNames(how, ["fields"]);
+    return this.#remote.call("mesh", [how.fields]);
   }
 
   /** Where the blocks of the file are, and which of them are here; `undefined` where it has none. */

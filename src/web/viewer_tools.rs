@@ -7,7 +7,6 @@ use super::tools::{
 };
 use super::viewer::Viewer;
 use crate::view::NormalKind;
-use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen]
@@ -26,7 +25,10 @@ impl Viewer {
         let (session, stored) = (self.file.session(), self.file.stored()?);
         let (surface, mesh) = (session.last_surfaces().0, session.last_view());
         let js = tools::iso_surface(surface, &stored);
-        put_fields(js.as_ref(), self.all_values(fields)?.map(|field| surface.interpolate(&mesh, &field)));
+        put_fields(
+            js.as_ref(),
+            fields.iter().map(|field| surface.interpolate(&mesh, &session.values(*field))),
+        );
         Ok(js)
     }
 
@@ -37,21 +39,21 @@ impl Viewer {
         let (session, stored) = (self.file.session(), self.file.stored()?);
         let (slice, mesh) = (session.last_surfaces().1, session.last_view());
         let js = tools::section(slice, &stored);
-        put_fields(js.as_ref(), self.all_values(fields)?.map(|field| slice.interpolate(&mesh, &field)));
+        put_fields(js.as_ref(), fields.iter().map(|field| slice.interpolate(&mesh, &session.values(*field))));
         Ok(js)
     }
 
     /// The boundary of the current mesh, with the values of other fields.
     pub fn surface(&mut self, fields: &[usize]) -> Result<JsSurface, WebError> {
         self.file.session_mut().view();
-        let (fields, stored) = (self.all_values(fields)?, self.file.stored()?);
-        Ok(tools::boundary(&self.file.session().last_view(), fields, &stored))
+        let (session, stored) = (self.file.session(), self.file.stored()?);
+        let fields = fields.iter().map(|field| session.values(*field));
+        Ok(tools::boundary(&session.last_view(), fields, &stored))
     }
 
-    /// A field at the points of the current mesh, by name or number.
-    pub fn values(&self, field: &JsValue) -> Result<Vec<f64>, WebError> {
-        let index = field_index(self.file.info()?, field)?;
-        Ok(self.file.session().values(index))
+    /// A field at the points of the current mesh, by its number.
+    pub fn values(&self, field: usize) -> Vec<f64> {
+        self.file.session().values(field)
     }
 
     /// The field at some points, three coordinates each; NaN outside of the mesh.
@@ -102,16 +104,5 @@ impl Viewer {
     /// A hash of the current mesh, the same wherever the same request was made.
     pub fn hash(&self) -> String {
         self.file.hash()
-    }
-}
-
-impl Viewer {
-    /// Fields at the points of the current mesh, by their numbers. Another volume may have come since these were looked up.
-    fn all_values(&self, fields: &[usize]) -> Result<impl Iterator<Item = Vec<f64>>, WebError> {
-        let info = self.file.info()?;
-        for field in fields {
-            field_index(info, &(*field).into())?;
-        }
-        Ok(fields.iter().map(|field| self.file.session().values(*field)))
     }
 }
