@@ -18,7 +18,6 @@ const OPEN_OPTIONS = ["signal", "onProgress", ...PLACES, "toolsUrl"];
 const NO_RETRY = "only a file that is fetched in parts can be continued: open it again";
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "arrays", "signal"];
 const NO_VIEW = "a stream is read only once; for views, open a URL, a Blob or bytes in memory";
-const NO_FIELDS = "goes with whole meshes, without `deltas`";
 const NO_ZERO_COPY = "needs `worker: false`, and no `deltas`: no other thread has this memory";
 
 /** A volume that is open: it can be refined while the rest of it is still arriving. */
@@ -109,7 +108,7 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
     const { deltas = false, partial = false, zeroCopy = false, signal } = how;
     signal?.throwIfAborted();
     const fields = fieldsOf(() => this.#info, how.fields);
-    if (deltas && fields.length > 0) throw new TetralodError("bad-option", `option \`fields\`: ${NO_FIELDS}`);
+    if (deltas && how.fields) throw new TetralodError("bad-option", "option `fields`: goes without `deltas`");
     if (zeroCopy && (this.#inWorker || deltas)) throw new TetralodError("bad-option", `option \`zeroCopy\`: ${NO_ZERO_COPY}`);
     const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays), fields, zeroCopy: Boolean(zeroCopy) };
     const sent = sendable(options, this.#inWorker);

@@ -9,17 +9,13 @@ import { TetralodError } from "./errors.js";
  * @param {boolean | readonly (string | number)[]} [wanted]
  */
 export function fieldsOf(info, wanted = false) {
-  if (wanted === false) return [];
-  const known = info();
-  if (!known) throw new TetralodError("not-ready", "the base mesh has not arrived yet");
-  const all = known.fields.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale }));
-  if (wanted === true) return all;
-  if (!Array.isArray(wanted)) throw new TetralodError("bad-option", "option `fields`: must be true, or a list of names or numbers");
-  return wanted.map((field) => {
-    const found = all.find(({ index, name }) => field === index || field === name);
-    if (found) return found;
-    throw new TetralodError("bad-option", `option \`fields\`: there is no field ${field}, only ${all.map(({ name }) => name).join(", ")}`);
-  });
+  if (!wanted) return [];
+  const all = info().fields.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale }));
+  const isOf = (one) => ({ index, name }) => one === index || one === name;
+  const found = wanted === true ? all : Array.isArray(wanted) && wanted.map((one) => all.find(isOf(one)));
+  if (found && found.every(Boolean)) return found;
+  const names = all.map(({ name }) => name).join(", ");
+  throw new TetralodError("bad-option", `option \`fields\`: must be true, or a list of names or numbers of ${names}; not ${wanted}`);
 }
 
 /**

@@ -56,13 +56,16 @@ test("what a viewer gives of its mesh is what MultiTessellation gives, with one 
   const page = await opened();
   const own = () => page.evaluate(async () => {
     const mt = window.tetralodDemo.mt ?? window.tetralodDemo.viewer;
-    const { positions } = await mt.slice([0, 0, 1], 0.5);
+    const how = { fields: true };
+    const slice = await mt.slice([0, 0, 1], 0.5, how);
+    const { positions } = slice;
     const [[p], line, surface, lines] = [
-      await mt.probe([0.5, 0.5, 0.5]), await mt.line([0, 0, 0], [1, 1, 1]), await mt.surface(), await mt.isosurface(0.5),
+      await mt.probe([0.5, 0.5, 0.5]), await mt.line([0, 0, 0], [1, 1, 1]), await mt.surface(how), await mt.isosurface(0.5, how),
     ];
     const { volume, histogram } = await mt.stats({ bins: 4 });
     const sizes = [positions, line.at, surface.indices, lines.positions, lines.normals].map((array) => array.length);
-    return JSON.stringify({ sizes, p, volume, bins: Array.from(histogram), hash: await mt.hash() });
+    const fields = [slice, surface, lines].map(({ fields }) => fields.map(({ index, name, values }) => [index, name, Array.from(values)]));
+    return JSON.stringify({ sizes, fields, p, volume, bins: Array.from(histogram), hash: await mt.hash() });
   });
   asked = [];
   const ofViewer = await own();
@@ -72,11 +75,12 @@ test("what a viewer gives of its mesh is what MultiTessellation gives, with one 
   const same = await page.evaluate(async () => {
     const { MultiTessellation } = await import("tetralod");
     window.tetralodDemo.mt = await MultiTessellation.open("/model.mt");
-    const whole = await window.tetralodDemo.mt.refine({ error: 0 });
-    const shown = await window.tetralodDemo.viewer.mesh();
-    return ["positions", "field", "tets", "neighbors"].map((name) => whole[name].length === shown[name].length);
+    const whole = await window.tetralodDemo.mt.refine({ error: 0 }, { fields: true });
+    const shown = await window.tetralodDemo.viewer.mesh({ fields: true });
+    const arrays = ["positions", "field", "tets", "neighbors"].map((name) => whole[name].length === shown[name].length);
+    return [...arrays, shown.fields[0].values.every((value, i) => value === shown.field[i] && value === whole.fields[0].values[i])];
   });
-  assert.deepEqual(same, [true, true, true, true]);
+  assert.deepEqual(same, [true, true, true, true, true]);
   assert.equal(await own(), ofViewer);
   const codes = await page.evaluate(() => {
     const code = (promise) => promise.then(() => "none", (error) => error.code);
