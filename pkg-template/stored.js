@@ -11,9 +11,10 @@ import { TetralodError } from "./errors.js";
 export function fieldsOf(info, wanted = false) {
   if (!wanted) return [];
   const all = info().fields.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale }));
+  if (wanted === true) return all;
   const isOf = (one) => ({ index, name }) => one === index || one === name;
-  const found = wanted === true ? all : Array.isArray(wanted) && wanted.map((one) => all.find(isOf(one)));
-  if (found && found.every(Boolean)) return found;
+  const found = Array.isArray(wanted) ? wanted.map((one) => all.find(isOf(one))) : [undefined];
+  if (found.every(Boolean)) return found;
   const names = all.map(({ name }) => name).join(", ");
   throw new TetralodError("bad-option", `option \`fields\`: must be true, or a list of names or numbers of ${names}; not ${wanted}`);
 }
