@@ -190,6 +190,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("stored.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     shell::run(&mut node_test("writers.test.js"))?;
+    shell::run(&mut node_test("tools.test.js"))?;
     shell::run(&mut node_test("bins.test.js"))?;
     with_fixture(|| {
         for name in [
