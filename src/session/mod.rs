@@ -350,7 +350,7 @@ impl Session {
     }
 
     /// The isosurfaces and the section as they were last asked for.
-    #[cfg(feature = "gpu")]
+    #[cfg(all(feature = "web", feature = "gpu", target_arch = "wasm32"))]
     pub(crate) fn last_surfaces(&self) -> (&IsoSurface, &Slice) {
         (&self.surface, &self.slice)
     }
