@@ -17,14 +17,14 @@ const { build } = createRequire(new URL("../../tests/js/package.json", import.me
 
 /** Bytes. An entry that outgrows its limit needs a reason for a higher one, in the message of the commit that raises it. */
 const LIMITS = {
-  ".": 16_300,
+  ".": 16_900,
   "./viewer": 7_800,
   "./element": 10_500,
   "./three": 2_500,
   "./vtk": 2_500,
   "./build": 4_000,
   "./inline": 400_000,
-  "./worker": 10_300,
+  "./worker": 10_800,
   "./viewer-worker": 19_500,
   "./build-worker": 5_500,
   "./core.wasm": 170_000,
