@@ -5,12 +5,12 @@ use super::query::Query;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
-use tetralod::io::{PointValues, PolyData};
+use tetralod::io::PolyData;
 use tetralod::view::is_closed;
 
 /// Writes isosurfaces: where the field has the values given with --iso.
 ///
-/// The mesh is refined around these values alone, to the error that is asked for.
+/// The mesh is refined around these values alone, to the error that is asked for. All fields are written.
 #[derive(clap::Args)]
 #[command(after_help = "Example: tetralod isosurface engine.mt --iso 0.3 --iso 0.6 --error 1% -o engine.vtp")]
 pub struct Arguments {
@@ -38,17 +38,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;
+    let fields = answer.all_values()?;
     let start = Instant::now();
-    let surface = answer.opened.session.isosurfaces(isovalues)?;
-    let (positions, normals) = (surface.positions.clone(), surface.normals.clone());
-    let (values, triangles) = (surface.values.clone(), surface.indices.clone());
+    let surface = answer.opened.session.isosurfaces(isovalues)?.clone();
     let seconds = start.elapsed().as_secs_f64();
-    let step = answer.opened.info()?.fields[answer.field].step;
+    let mesh = answer.opened.session.view();
+    let mut values: Vec<Vec<f64>> = fields.iter().map(|field| surface.interpolate(&mesh, field)).collect();
+    // Of its own field they are the isovalues, without rounding.
+    values[answer.field] = surface.values;
     let data = PolyData {
-        normals,
-        fields: vec![PointValues { name: answer.summary.field.clone(), values, step }],
-        triangles,
-        ..answer.poly_data(positions)?
+        normals: surface.normals,
+        fields: answer.point_values(values)?,
+        triangles: surface.indices,
+        ..answer.poly_data(surface.positions)?
     };
     let origin = arguments.output.write(&data)?;
     let report = Report {

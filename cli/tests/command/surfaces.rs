@@ -113,10 +113,11 @@ fn isosurfaces_have_their_values_and_the_boundary_its_area() {
         );
     }
     let (names, rows) = table(&out);
-    assert_eq!(names, ["x", "y", "z", "nx", "ny", "nz", "hill"]);
+    assert_eq!(names, ["x", "y", "z", "nx", "ny", "nz", "ramp", "hill", "v_x", "v_y", "v_z"]);
     let ring = |row: &Vec<f64>| [row[0] - 1.0, row[1] - 0.5, row[2] - 0.5].iter().map(|x| x * x).sum::<f64>();
     for row in &rows {
-        assert!((ring(row) - (1.0 / row[6] - 0.1)).abs() < 0.02, "{row:?}");
+        assert!((ring(row) - (1.0 / row[7] - 0.1)).abs() < 0.02, "{row:?}");
+        assert!((row[6] - (row[0] + 2.0 * row[1] - row[2])).abs() < 1e-3, "the ramp is linear: {row:?}");
     }
     let ramp = json(&["isosurface", &mt, "--iso", "1.5", "--field", "ramp", "-o", &out, "--json"]);
     assert_eq!(ramp["closed"], false);
