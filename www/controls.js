@@ -32,7 +32,7 @@ const FLIGHTS = { w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], e: [
 /**
  * What the page does. Of a rectangle that is being spanned, `onSpan` gets the places; of one that is done, the points, too.
  *
- * @typedef {{ onHome: () => void, onBox: (box: number[]) => void, onClick: (point: Point) => void,
+ * @typedef {{ onHome: () => void, onBox: (box: Promise<number[]>) => void, onClick: (point: Point) => void,
  *   onHover: (point: Point, place: Place) => void, onLeave: () => void,
  *   onSpan: (from: Place, to: Place, points?: [Point, Point]) => void, isFlying: () => boolean }} Actions
  */
@@ -161,7 +161,7 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
   }
 
   function drag(event) {
-    viewer.dragRegion(handle, ...point(event)).then(onBox, ignore);
+    onBox(viewer.dragRegion(handle, ...point(event)));
   }
 
   function pinch(event, dx, dy) {

@@ -26,7 +26,7 @@ import { attachRequest } from "./request.js";
 import { seedPlane } from "./planes.js";
 import { attachScene, draw, fractionOf, isovalue, setIsovalue, showLegend } from "./scene.js";
 import { attachShare } from "./share.js";
-import { attachState, read } from "./state.js";
+import { attachState, hold, read } from "./state.js";
 import { attachTabs } from "./tabs.js";
 import { attachTheme } from "./theme.js";
 import { TransferEditor } from "./transfer.js";
@@ -58,7 +58,7 @@ async function start() {
   attachOverlay(viewer);
   attachControls(canvas, viewer, {
     onHome: () => viewer.home(),
-    onBox: boxWasDragged,
+    onBox: (box) => hold(box.then(boxWasDragged)),
     onClick: clicked,
     onHover: (point, place) => demo.info && page.probes.hover(point, place),
     onLeave: () => page.probes.leave(),

@@ -276,6 +276,24 @@ const [past, future] = [/** @type {string[]} */ ([]), /** @type {string[]} */ ([
 let now;
 let timer;
 
+/** What belongs to the next state and has not ended. @type {Set<Promise<void>>} */
+const pending = new Set();
+/** Whether a pointer is pressed: what it drags is one step, however long it rests on the way. */
+let isPressed = false;
+
+/** Takes what `work` does into the next state, however late the viewer answers. */
+export function hold(work) {
+  const ended = work
+    .catch((error) => {
+      if (error?.code !== "freed") console.warn(error);
+    })
+    .then(() => {
+      pending.delete(ended);
+      changed();
+    });
+  pending.add(ended);
+}
+
 /** Something may have changed: writes the state when it rests. */
 export function changed() {
   clearTimeout(timer);
@@ -285,7 +303,7 @@ export function changed() {
 /** Writes the state into the address, and remembers the one before. */
 export function save() {
   clearTimeout(timer);
-  if (!demo.info || isPlaying()) return;
+  if (!demo.info || isPlaying() || isPressed || pending.size > 0) return;
   const words = written(stateNow());
   if (words === now) return;
   if (now !== undefined) past.push(now);
@@ -302,7 +320,9 @@ function set(words) {
   history.replaceState(null, "", words ? `#${words}` : `${location.pathname}${location.search}`);
 }
 
-function step(from, to) {
+async function step(from, to) {
+  await Promise.all(pending);
+  if (isPressed) return;
   save();
   if (from.length === 0) return;
   to.push(now);
@@ -324,7 +344,10 @@ export function reset() {
 export function attachState(viewer) {
   entries = makeEntries();
   viewer.addEventListener("camera", cameraMoved);
-  for (const name of ["input", "change", "click", "keyup", "pointerup"]) document.addEventListener(name, changed);
+  for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) {
+    document.addEventListener(name, (event) => (isPressed = /** @type {PointerEvent} */ (event).buttons !== 0), { capture: true });
+  }
+  for (const name of ["input", "change", "click", "keyup", "pointerup", "pointercancel"]) document.addEventListener(name, changed);
   window.addEventListener("hashchange", () => restore(read(location.hash)));
   $("undo").addEventListener("click", undo);
   $("redo").addEventListener("click", redo);

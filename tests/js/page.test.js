@@ -501,8 +501,22 @@ test("a handle of the region is dragged, and the mesh follows", async () => {
   await page.mouse.down();
   // The page asks the viewer what was pressed.
   await settle(page);
+  // A viewer that answers late, so that the state rests between its answers: the drag is one step to undo all the same.
+  await page.evaluate(() => {
+    const { viewer } = window.tetralodDemo;
+    const answers = [];
+    const drag = viewer.dragRegion.bind(viewer);
+    viewer.dragRegion = (...where) => {
+      const wait = 500 * (answers.length + 1);
+      const answer = drag(...where).then((box) => new Promise((resolve) => setTimeout(resolve, wait, box)));
+      answers.push(answer);
+      return answer;
+    };
+    /** @type {any} */ (window).answered = () => Promise.all(answers);
+  });
   await page.mouse.move(x - 40, y - 8, { steps: 6 });
   await page.mouse.up();
+  await page.evaluate(() => /** @type {any} */ (window).answered());
   await page.waitForFunction((x1) => window.tetralodDemo.request.box[3] < x1 - 0.02, box[3], { timeout: PATIENCE });
   await settle(page);
   const moved = (await demo(page, "request")).box;
