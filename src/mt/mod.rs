@@ -254,9 +254,9 @@ impl MtInfo {
         error.max(self.floor(field)) * self.fields[field].range()
     }
 
-    /// How far the boundary of a mesh within `error` is from that of the input at most, in model units, compared at the vertices of
-    /// both, and at the middles of the mesh's boundary triangles and of their edges. Elsewhere on curved boundaries it may be a little more:
-    /// `docs/promises.md` has numbers.
+    /// How far the boundaries of a mesh within `error` and of the input are from each other at most, in model units, at the vertices of both
+    /// and at the middles of their triangles and edges. Elsewhere on curved boundaries it may be a little more. Builders do not bound it at the
+    /// middles of the input's triangles and edges: `docs/promises.md` has what was measured there.
     pub fn boundary_bound(&self, error: f64) -> f64 {
         error * self.displacement_per_error + self.quantization
     }

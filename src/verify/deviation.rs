@@ -7,6 +7,7 @@ use crate::mesh::{TetMesh, boundary_faces};
 use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, UpdateId};
 use crate::refine::{Need, Part};
 use glam::DVec3;
+use std::collections::HashSet;
 
 /// The input, prepared for being compared with.
 pub struct Deviation<'a> {
@@ -18,8 +19,7 @@ pub struct Deviation<'a> {
     levels: Vec<i32>,
     /// The input's values as fractions of each field's range: `values[vertex * fields + f]`.
     values: Vec<f64>,
-    boundary: TriangleGrid,
-    boundary_vertices: Vec<u32>,
+    boundary: Surface,
     /// One in so many vertices is measured.
     stride: usize,
     /// Rounding errors of distances.
@@ -73,13 +73,8 @@ impl<'a> Deviation<'a> {
         let places = input.positions.iter().map(|p| (DVec3::from(*p) - origin) / step).collect();
         let levels = each().map(|(value, field)| field.nearest(value)).collect();
         let values = each().map(|(value, field)| value / field.range()).collect();
-        let at = |v: u32| DVec3::from(info.lattice.point(positions[v as usize]));
-        let boundary = TriangleGrid::new(faces.iter().map(|face| face.map(at)).collect());
-        let mut boundary_vertices: Vec<u32> = faces.into_iter().flatten().collect();
-        boundary_vertices.sort_unstable();
-        boundary_vertices.dedup();
+        let boundary = Surface::new(info, faces.iter().map(|face| face.map(|v| positions[v as usize])));
         let stride = points.div_ceil(vertices.max(1)).max(1);
-        boundary_vertices.retain(|&v| (v as usize).is_multiple_of(stride));
         let slack = 1e-9 * crate::geom::Bounds::of(&input.positions).diagonal();
         Ok(Self {
             info,
@@ -89,7 +84,6 @@ impl<'a> Deviation<'a> {
             levels,
             values,
             boundary,
-            boundary_vertices,
             stride,
             slack,
         })
@@ -120,8 +114,9 @@ impl<'a> Deviation<'a> {
         look.at_vertices(&mut found);
         // Elsewhere the boundary may be anywhere.
         if asks.iter().any(|ask| matches!(ask.need.part, Part::Everywhere | Part::Region(_))) {
-            look.at_extracted_boundary(&mut found);
-            look.at_reference_boundary(&mut found);
+            let (ours, theirs) = (&look.border.surface, &self.boundary);
+            look.compare_surfaces(ours, theirs, "the extracted boundary", &mut found);
+            look.compare_surfaces(theirs, ours, "the input's boundary", &mut found);
         }
         found
     }
@@ -286,71 +281,66 @@ impl Look<'_> {
         let moved =
             p.distance(DVec3::from(self.of.info.lattice.point(self.of.points.points()[point as usize])));
         let slack = moved + self.of.slack;
-        self.border.triangles.within(p, reach * per_error + slack, |i, q, distance| {
+        self.border.surface.triangles.within(p, reach * per_error + slack, |i, q, distance| {
             let (t, face) = self.border.faces[i as usize];
             let tet = self.mesh.tets[t as usize];
             let away = (distance - slack).max(0.0);
             let displaced = if away > 0.0 { away / per_error } else { 0.0 };
-            let own = weights_on_triangle(q, self.border.triangles.corners[i as usize]);
+            let own = weights_on_triangle(q, self.border.surface.triangles.corners[i as usize]);
             let weights = tet.map(|v| face.iter().zip(own).find(|(w, _)| **w == v).map_or(0.0, |(_, x)| x));
             least = least.min(self.ratio(ask, point, &Place { tet: t, weights, displaced }));
         });
         least
     }
 
-    /// Whether the extracted boundary stays near that of the input, at its vertices.
-    fn at_extracted_boundary(&self, found: &mut Measured) {
-        let mut vertices: Vec<u32> = self.border.faces.iter().flat_map(|(_, face)| *face).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        let places = vertices.into_iter().step_by(self.of.stride).map(|v| self.mesh.positions[v as usize]);
-        self.compare_places(places, &self.of.boundary, "the extracted boundary", found);
-    }
-
-    /// Whether the boundary of the input stays near the extracted one, at its vertices.
-    fn at_reference_boundary(&self, found: &mut Measured) {
-        let places = self.of.boundary_vertices.iter().map(|&v| self.of.points.points()[v as usize]);
-        self.compare_places(places, &self.border.triangles, "the input's boundary", found);
-    }
-
-    fn compare_places(
-        &self,
-        places: impl Iterator<Item = [i32; 3]>,
-        other: &TriangleGrid,
-        what: &str,
-        found: &mut Measured,
-    ) {
+    /// Whether a boundary is near the other one, at the [`places`] of its faces.
+    fn compare_surfaces(&self, one: &Surface, other: &Surface, what: &str, found: &mut Measured) {
         let mut failures = Failures::default();
         // The next place is likely near the same triangle.
         let mut first = 0;
-        for place in places {
-            let p = self.of.info.lattice.point(place);
-            let binding = self.asks.iter().filter(|ask| ask.binds_boundary_at(p));
-            let bound = binding.map(|ask| ask.bound).fold(f64::INFINITY, f64::min);
-            if bound == f64::INFINITY {
-                continue;
+        let faces = one.faces.iter().zip(&one.triangles.corners).step_by(self.of.stride);
+        for (_, &triangle) in faces.filter(|(face, _)| !other.has.contains(*face)) {
+            // The place that is furthest away.
+            let mut worst = (0.0, String::new());
+            for (sort, p) in places(triangle) {
+                let binding = self.asks.iter().filter(|ask| ask.binds_boundary_at(p.to_array()));
+                let bound = binding.map(|ask| ask.bound).fold(f64::INFINITY, f64::min);
+                if bound == f64::INFINITY {
+                    continue;
+                }
+                let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
+                // Where that is no more than elsewhere, it need not be known how near the nearest triangle is.
+                let enough = if bound > 0.0 { allowed * found.worst_ratio.min(1.0) } else { allowed };
+                if let Some(near) = other.triangles.any_within(p, enough, first) {
+                    first = near;
+                    continue;
+                }
+                let distance = other.triangles.nearest(p).map_or(f64::INFINITY, |(_, q)| p.distance(q));
+                if bound > 0.0 {
+                    found.worst_ratio = found.worst_ratio.max(distance / allowed);
+                }
+                if distance > allowed && distance > worst.0 {
+                    let at = p.to_array();
+                    let failure = format!(
+                        "{sort} of {what} at {at:?} is {distance} from the other, more than {allowed}"
+                    );
+                    worst = (distance, failure);
+                }
             }
-            let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
-            let p = DVec3::from(p);
-            // Where that is no more than elsewhere, it need not be known how near the nearest triangle is.
-            let enough = if bound > 0.0 { allowed * found.worst_ratio.min(1.0) } else { allowed };
-            if let Some(near) = other.any_within(p, enough, first) {
-                first = near;
-                continue;
-            }
-            let distance = other.nearest(p).map_or(f64::INFINITY, |(_, q)| p.distance(q));
-            if bound > 0.0 {
-                found.worst_ratio = found.worst_ratio.max(distance / allowed);
-            }
-            if distance > allowed {
-                let at = p.to_array();
-                failures.add(|| {
-                    format!("vertex of {what} at {at:?} is {distance} from the other, more than {allowed}")
-                });
+            if worst.0 > 0.0 {
+                failures.add(|| worst.1);
             }
         }
-        failures.end(&format!("vertices of {what}"), found);
+        failures.end(&format!("faces of {what}"), found);
     }
+}
+
+/// Where the face of a boundary is compared with another boundary.
+fn places([a, b, c]: [DVec3; 3]) -> [(&'static str, DVec3); 7] {
+    let middles = [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+    let [abc, ab, bc, ca] = middles.map(|p| ("middle", p));
+    let [a, b, c] = [a, b, c].map(|p| ("vertex", p));
+    [a, b, c, ab, bc, ca, abc]
 }
 
 /// Failures of one kind: the first ones in full, and their number.
@@ -376,18 +366,36 @@ impl Failures {
     }
 }
 
+/// A boundary.
+struct Surface {
+    /// Its faces, in model units.
+    triangles: TriangleGrid,
+    /// The same on the lattice, corners ascending, and as a set: faces that two boundaries share need not be compared.
+    faces: Vec<[[i32; 3]; 3]>,
+    has: HashSet<[[i32; 3]; 3]>,
+}
+
+impl Surface {
+    fn new(info: &MtInfo, faces: impl Iterator<Item = [[i32; 3]; 3]>) -> Self {
+        let mut faces: Vec<[[i32; 3]; 3]> = faces.collect();
+        let at = |q: [i32; 3]| DVec3::from(info.lattice.point(q));
+        let triangles = TriangleGrid::new(faces.iter().map(|face| face.map(at)).collect());
+        faces.iter_mut().for_each(|face| face.sort_unstable());
+        Self { triangles, has: faces.iter().copied().collect(), faces }
+    }
+}
+
 /// The boundary of an extracted mesh.
 struct Border {
-    triangles: TriangleGrid,
-    /// The tetrahedron behind each triangle, and the triangle's vertices.
+    surface: Surface,
+    /// The tetrahedron behind each face, and the face's vertices.
     faces: Vec<(u32, [u32; 3])>,
 }
 
 impl Border {
     fn of(mesh: &PlainMesh<'_>, info: &MtInfo) -> Self {
         let faces: Vec<(u32, [u32; 3])> = mesh.boundary().collect();
-        let at = |v: u32| DVec3::from(info.lattice.point(mesh.positions[v as usize]));
-        let triangles = TriangleGrid::new(faces.iter().map(|(_, face)| face.map(at)).collect());
-        Self { triangles, faces }
+        let corners = faces.iter().map(|(_, face)| face.map(|v| mesh.positions[v as usize]));
+        Self { surface: Surface::new(info, corners), faces }
     }
 }

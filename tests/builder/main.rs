@@ -17,6 +17,7 @@ mod restrictions;
 mod support;
 mod theory;
 mod touching;
+mod verify_boundary;
 mod verify_real;
 mod verify_samples;
 mod verify_shown;
