@@ -53,9 +53,9 @@ struct Report<'a> {
 const LONG: Duration = Duration::from_secs(10);
 /// Percent between two lines of progress.
 const PRINT_EVERY: u64 = 10;
-/// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: three current meshes, and what requests are
-/// answered with.
-const TET_BYTES: u64 = 210;
+/// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: current meshes, a list of all tetrahedra of the
+/// MT (155 for kind half-edge, 310 for edge), and what requests are answered with.
+const TET_BYTES: u64 = 520;
 const VERTEX_BYTES: u64 = 240;
 
 /// About the most memory that a verification takes.

@@ -1,8 +1,8 @@
 //! Verification: checks all guarantees of an MT against the mesh that it was built from.
 //!
 //! Verification does not rely on the results of refinement: it checks meshes from their plain arrays, measures errors
-//! at every reference vertex, and makes every request twice, from the base mesh and from the mesh of the request
-//! before.
+//! at every reference vertex, and compares each mesh with what follows from a list of all tetrahedra of the MT; only which mesh is the best
+//! within a budget, it asks of refinement from the base mesh.
 //!
 //! It checks, for regions, values, views, transfer functions, their unions, and budgets:
 //! - **Full circle**: error 0 gives the reference mesh, tetrahedron for tetrahedron, on the lattice; error ∞ the base.
@@ -16,18 +16,21 @@
 //!   Of those that the boundary has left outside, a place on it that is near enough counts: a displacement `d` is an error
 //!   of `d / displacement_per_error`. In a view, the error is compared with the one that fills the pixels at that vertex; with a
 //!   transfer function, the colour of the interpolated value with that of the vertex.
-//! - **Boundary**: no vertex of the extracted boundary is further from the reference boundary than the bound allows.
+//! - **Boundary**: neither boundary, the extracted and the reference one, is further from the other than the bound allows: at its
+//!   vertices, and at the middles of its faces and edges.
 //! - **Isovalues**: a reference vertex whose error is larger lies on the same side of every range of values as all of
 //!   its tetrahedron, so every part of an isosurface is present and as accurate as requested.
 //! - **Answers**: `satisfied` and the bounds are true, budgets are kept, a larger budget never has a larger excess, and
-//!   the same request gives the same mesh after any other request and in any steps; repeating it changes nothing.
+//!   the same request gives the same mesh after any other request and in any steps, that of the updates which the request needs; repeating
+//!   it changes nothing.
 //! - **History**: a hundred more requests, for values all over the range, for boxes and for cameras that move, some with budgets, in
-//!   random order, each from the base mesh and from others.
+//!   random order: from the base mesh, from those of other requests, and by way of the reference mesh.
 //! - **Steps**: between them the mesh is valid and within the budget.
 //!
 //! [`run_shown`] checks what a session makes of its meshes.
 
 mod deviation;
+mod expected;
 mod history;
 mod mesh_checks;
 mod parts;
@@ -44,6 +47,7 @@ use crate::mesh::TetMesh;
 use crate::mt::{ApplyUpdates, ErrorCode, check_errors};
 use crate::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetData};
 use deviation::{Deviation, TetErrors};
+use expected::Expected;
 use history::Numbers;
 use mesh_checks::PlainMesh;
 use queries::Query;
@@ -54,7 +58,7 @@ use std::sync::Arc;
 pub struct VerifyReport {
     /// Whether all checks passed.
     pub valid: bool,
-    /// Requests that were made, each from the base mesh and from another mesh.
+    /// Requests that were made and checked.
     pub queries: u32,
     /// The largest measured error as a fraction of the guaranteed one; at most 1 if the guarantee holds.
     pub worst_error_ratio: f64,
@@ -165,7 +169,7 @@ pub fn run_requests<M: ApplyUpdates>(
 struct Plan {
     /// Requests whose meshes are checked in full.
     queries: Vec<Query>,
-    /// Requests for which only the independence of earlier requests is checked.
+    /// Requests for which only is checked that each has the mesh which it needs, whatever was asked for before.
     histories: Vec<Query>,
     /// About how many reference vertices are measured.
     vertices: usize,
@@ -203,24 +207,40 @@ fn verify<M: ApplyUpdates>(
     let untouched = fresh(mt)?;
     let (reference, base) = check_full_circle(mt, &deviation, report)?;
     check_order(mt, report);
-    let steps = (2 * queries.len() + histories.len()) as u32;
-    let mut hashes = Vec::with_capacity(queries.len());
-    let mut excesses = Vec::with_capacity(queries.len());
-    for (i, query) in (0..).zip(queries) {
-        on_progress(i, steps);
-        let mut front = base.clone();
-        let outcome = satisfy(mt, &mut front, query)?;
-        Case { mt, query, front: &front, outcome: &outcome }.check(&base, &reference, &deviation, report);
-        hashes.push(front.mesh().hash());
-        excesses.push(outcome.excess);
+    let expected = Expected::of(mt)?;
+    let first = queries.len() as u32;
+    let steps = first + histories.len() as u32;
+    // From a mesh that has never been refined: what others remember of updates must not count.
+    let mut walk = Walk { mt, base: &base, shape: &reference, front: untouched.clone(), numbers: Numbers(1) };
+    let mut excesses = vec![0.0; queries.len()];
+    for (step, i) in (0..).zip(mixed(queries.len())) {
+        on_progress(step, steps);
+        let query = &queries[i];
+        let outcome = walk.answer(query, report)?;
+        excesses[i] = outcome.excess;
         report.queries += 1;
+        Case { mt, query, front: &walk.front, outcome: &outcome }
+            .check(&base, &reference, &deviation, report);
+        let hash = expected::hash(walk.front.mesh());
+        if hash == expected.hash(mt, &base, query)? {
+            walk.ask_again(query, hash, report)?;
+        } else {
+            note(report, query, NOT_EXPECTED);
+            walk.front = untouched.clone();
+        }
     }
     check_monotone(queries, &excesses, report);
-    // From a mesh that has never been refined: what others remember of updates must not count either.
-    let walk = Walk { mt, base: &untouched, shape: &reference, numbers: Numbers(1) };
-    let first = queries.len() as u32;
-    walk.run(queries, &hashes, &mut |i| on_progress(first + i, steps), report)?;
-    history::check(mt, [&untouched, &base], histories, &mut |i| on_progress(2 * first + i, steps), report)
+    let fronts = [&untouched, &base];
+    history::check(mt, &expected, fronts, histories, &mut |i| on_progress(first + i, steps), report)
+}
+
+/// A mesh that is not a function of the request alone.
+const NOT_EXPECTED: &str = "the mesh is not that of the updates which the request needs";
+
+/// All numbers below `count`, neighbours far apart.
+fn mixed(count: usize) -> impl Iterator<Item = usize> {
+    let stride = (count / 3..).find(|&s| s > 0 && coprime(s, count)).unwrap_or(1);
+    (0..count).map(move |step| step * stride % count)
 }
 
 /// Of two requests that differ in their budgets alone, the one with the larger budget must not have a larger excess.
@@ -292,11 +312,12 @@ fn check_order(mt: &impl ApplyUpdates, report: &mut VerifyReport) {
     }
 }
 
-/// Makes all requests again, in a mixed order and in steps, each from the mesh of the one before.
+/// Makes requests in steps, each from the mesh of the one before.
 struct Walk<'a, M> {
     mt: &'a M,
     base: &'a Front,
     shape: &'a mesh_checks::Shape,
+    front: Front,
     /// For the lengths of steps, from one update to many of them.
     numbers: Numbers,
 }
@@ -305,45 +326,16 @@ struct Walk<'a, M> {
 const MOST_STEPS: u32 = 5;
 
 impl<M: ApplyUpdates> Walk<'_, M> {
-    fn run(
-        mut self,
-        queries: &[Query],
-        hashes: &[u64],
-        on_progress: &mut dyn FnMut(u32),
-        report: &mut VerifyReport,
-    ) -> Result<(), String> {
-        let count = queries.len();
-        let stride = (count / 3..).find(|&s| s > 0 && coprime(s, count)).unwrap_or(1);
-        let mut front = self.base.clone();
-        for step in 0..count {
-            on_progress(step as u32);
-            let i = step * stride % count;
-            let query = &queries[i];
-            self.answer(&mut front, query, report)?;
-            if front.mesh().hash() != hashes[i] {
-                note(report, query, "the mesh depends on what was asked for before");
-                front = self.base.clone();
-                continue;
-            }
-            let again = satisfy(self.mt, &mut front, query)?;
-            if again.refined + again.coarsened > 0 || front.mesh().hash() != hashes[i] {
-                note(report, query, "asked for again, the mesh changes");
-            }
-        }
-        Ok(())
-    }
-
-    fn answer(&mut self, front: &mut Front, query: &Query, report: &mut VerifyReport) -> Result<(), String> {
-        front.request(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
-        for step in 1..=MOST_STEPS {
-            let most = if step < MOST_STEPS { 1 << (self.numbers.next() % 16) } else { u64::MAX };
-            let outcome = front
-                .step(self.mt, &mut |done| done.refined + done.coarsened < most)
-                .map_err(|error| format!("{query}: the MT is damaged: {error}"))?;
+    fn answer(&mut self, query: &Query, report: &mut VerifyReport) -> Result<Outcome, String> {
+        let criterion = Arc::new(query.criterion(self.mt.info()));
+        self.front.request(self.mt, criterion, query.request.budget);
+        for step in 1..MOST_STEPS {
+            let most = 1 << (self.numbers.next() % 16);
+            let outcome = self.step(query, most)?;
             if outcome.done {
-                return Ok(());
+                return Ok(outcome);
             }
-            let mesh = PlainMesh::of(front.mesh());
+            let mesh = PlainMesh::of(self.front.mesh());
             let checked = check_budget(query, &mesh, self.base);
             // A check of the whole mesh takes time: once for each request is enough.
             let checked = if step > 1 { checked } else { checked.and_then(|()| mesh.check(self.shape)) };
@@ -351,7 +343,21 @@ impl<M: ApplyUpdates> Walk<'_, M> {
                 note(report, query, &format!("between steps, {failure}"));
             }
         }
-        note(report, query, "stopped although nothing stood in the way");
+        self.step(query, u64::MAX)
+    }
+
+    /// Goes on until so many updates have been applied or undone.
+    fn step(&mut self, query: &Query, most: u64) -> Result<Outcome, String> {
+        let outcome = self.front.step(self.mt, &mut |done| done.refined + done.coarsened < most);
+        outcome.map_err(|error| format!("{query}: the MT is damaged: {error}"))
+    }
+
+    /// Makes the request again that has just been answered by the mesh with this hash.
+    fn ask_again(&mut self, query: &Query, hash: u64, report: &mut VerifyReport) -> Result<(), String> {
+        let again = satisfy(self.mt, &mut self.front, query)?;
+        if again.refined + again.coarsened > 0 || expected::hash(self.front.mesh()) != hash {
+            note(report, query, "asked for again, the mesh changes");
+        }
         Ok(())
     }
 }
