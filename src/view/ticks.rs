@@ -62,7 +62,7 @@ pub fn linear_ticks(range: [f64; 2], count: usize) -> Vec<Tick> {
 ///
 /// ```
 /// let ends = tetralod::view::end_ticks([1.0 / 3.0, 17.0], false).expect("a range");
-/// assert_eq!(ends.map(|tick| tick.label), ["0.3", "17.0"]);
+/// assert_eq!(ends.map(|tick| tick.label), ["0.33", "17.00"]);
 /// ```
 pub fn end_ticks(range: [f64; 2], is_log: bool) -> Option<[Tick; 2]> {
     let [low, high] = ascending(range).filter(|[low, high]| low < high)?;
