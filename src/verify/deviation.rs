@@ -293,16 +293,22 @@ impl Look<'_> {
         least
     }
 
-    /// Whether a boundary is near the other one, at the [`places`] of its faces.
+    /// Whether a boundary is near the other one, at the [`PLACES`] of its faces.
     fn compare_surfaces(&self, one: &Surface, other: &Surface, what: &str, found: &mut Measured) {
         let mut failures = Failures::default();
         // The next place is likely near the same triangle.
         let mut first = 0;
-        let faces = one.faces.iter().zip(&one.triangles.corners).step_by(self.of.stride);
-        for (_, &triangle) in faces.filter(|(face, _)| !other.has.contains(*face)) {
+        let [origin, step] = [self.of.info.lattice.origin, self.of.info.lattice.step].map(DVec3::from);
+        // Faces around an edge or a vertex have it in common.
+        let mut seen = HashSet::new();
+        for face in one.faces.iter().step_by(self.of.stride).filter(|face| !other.has.contains(*face)) {
             // The place that is furthest away.
             let mut worst = (0.0, String::new());
-            for (sort, p) in places(triangle) {
+            for (sort, sixths) in places(face) {
+                if !seen.insert(sixths) {
+                    continue;
+                }
+                let p = origin + step * DVec3::from(sixths.map(|q| q as f64 / 6.0));
                 let binding = self.asks.iter().filter(|ask| ask.binds_boundary_at(p.to_array()));
                 let bound = binding.map(|ask| ask.bound).fold(f64::INFINITY, f64::min);
                 if bound == f64::INFINITY {
@@ -335,12 +341,21 @@ impl Look<'_> {
     }
 }
 
-/// Where the face of a boundary is compared with another boundary.
-fn places([a, b, c]: [DVec3; 3]) -> [(&'static str, DVec3); 7] {
-    let middles = [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
-    let [abc, ab, bc, ca] = middles.map(|p| ("middle", p));
-    let [a, b, c] = [a, b, c].map(|p| ("vertex", p));
-    [a, b, c, ab, bc, ca, abc]
+/// Parts of the corners, in sixths, of each place where the face of a boundary is compared with another boundary.
+const PLACES: [(&str, [i64; 3]); 7] = [
+    ("vertex", [6, 0, 0]),
+    ("vertex", [0, 6, 0]),
+    ("vertex", [0, 0, 6]),
+    ("middle", [3, 3, 0]),
+    ("middle", [0, 3, 3]),
+    ("middle", [3, 0, 3]),
+    ("middle", [2, 2, 2]),
+];
+
+/// These places of a face, in sixths of a step of the lattice: exact, so that all faces around an edge agree about its middle.
+fn places(face: &[[i32; 3]; 3]) -> [(&'static str, [i64; 3]); 7] {
+    let mean = |parts: [i64; 3], i: usize| (0..3).map(|k| parts[k] * i64::from(face[k][i])).sum();
+    PLACES.map(|(sort, parts)| (sort, [0, 1, 2].map(|i| mean(parts, i))))
 }
 
 /// Failures of one kind: the first ones in full, and their number.

@@ -343,7 +343,11 @@ impl<M: ApplyUpdates> Walk<'_, M> {
                 note(report, query, &format!("between steps, {failure}"));
             }
         }
-        self.step(query, u64::MAX)
+        let outcome = self.step(query, u64::MAX)?;
+        if !outcome.done {
+            note(report, query, "stopped although nothing stood in the way");
+        }
+        Ok(outcome)
     }
 
     /// Goes on until so many updates have been applied or undone.
