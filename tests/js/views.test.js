@@ -67,12 +67,12 @@ for (const worker of [true, false]) {
       const mt = await open(whole);
       const all = await mt.refine({ error: "2%" });
       const some = await mt.refine({ error: "2%" }, { arrays: ["tets", "positions"] });
-      // What numbers are relative to stands beside all arrays.
-      assert.deepEqual(Object.keys(some).sort(), ["changes", "offset", "origin", "positions", "scale", "stats", "tets"]);
+      // What numbers are relative to stands beside all arrays, and so does the list of the fields that were asked for.
+      assert.deepEqual(Object.keys(some).sort(), ["changes", "fields", "offset", "origin", "positions", "scale", "stats", "tets"]);
       assert.deepEqual([some.positions, some.tets], [all.positions, all.tets]);
-      assert.deepEqual(Object.keys(await mt.refine({ error: "3%" }, { arrays: [] })).sort(), ["changes", "offset", "origin", "scale", "stats"]);
+      assert.deepEqual(Object.keys(await mt.refine({ error: "3%" }, { arrays: [] })).sort(), ["changes", "fields", "offset", "origin", "scale", "stats"]);
       for await (const step of mt.refineSteps({ error: "1%" }, { arrays: ["field"] })) {
-        assert.deepEqual(Object.keys(step).sort(), ["changes", "field", "offset", "origin", "scale", "stats"]);
+        assert.deepEqual(Object.keys(step).sort(), ["changes", "field", "fields", "offset", "origin", "scale", "stats"]);
         assert.equal(step.field.length, step.stats.vertices);
       }
       await mt.refine({ error: "5%" }, { arrays: [] });
