@@ -2,9 +2,8 @@
 
 use super::work_mesh::keep;
 use crate::mesh::NONE;
+use foldhash::HashMap;
 use glam::{DMat3, DVec3};
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
 
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face.
 pub(super) const SLACK: f64 = 1e-9;
@@ -49,29 +48,8 @@ impl Lists {
 /// The same where few tetrahedra have any points: those without take no memory.
 #[derive(Default)]
 pub(super) struct SparseLists {
-    first: NumberMap,
-    next: NumberMap,
-}
-
-/// A number for each of a few others.
-type NumberMap = HashMap<u32, u32, BuildHasherDefault<Spread>>;
-
-/// Hashes a number by a product: Fibonacci hashing.
-#[derive(Default)]
-struct Spread(u64);
-
-impl Hasher for Spread {
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&byte| self.write_u32(u32::from(byte)));
-    }
-
-    fn write_u32(&mut self, number: u32) {
-        self.0 = (self.0 ^ u64::from(number)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
+    first: HashMap<u32, u32>,
+    next: HashMap<u32, u32>,
 }
 
 impl SparseLists {

@@ -49,6 +49,12 @@ impl PointGrid {
         (z * self.boxes[1] + y) * self.boxes[0] + x
     }
 
+    /// The points at a position.
+    pub fn at(&self, position: [i32; 3]) -> impl Iterator<Item = u32> {
+        let nearby = self.in_box.of(self.index(position)).iter().copied();
+        nearby.filter(move |&i| self.points[i as usize] == position)
+    }
+
     /// Calls `visit` with all points that may be in a tetrahedron: those in its bounds and one step around, since a point may
     /// be half a step beside its place on the lattice.
     pub fn near_tet(&self, corners: &[[i32; 3]; 4], mut visit: impl FnMut(u32)) {

@@ -86,12 +86,42 @@ impl TriangleGrid {
         });
     }
 
+    /// Calls `visit` with the triangles that come within `most` of `p`, the nearest one first, each with its nearest point and the
+    /// distance, until it returns true.
+    #[cfg(feature = "build")]
+    pub fn outwards(&self, p: DVec3, most: f64, mut visit: impl FnMut(u32, DVec3, f64) -> bool) {
+        let most = most.min(self.whole(p));
+        // In shells, each twice as wide as the one before.
+        let (mut from, mut to) = (f64::NEG_INFINITY, self.side / 4.0);
+        let mut shell = Vec::new();
+        while from < most {
+            let radius = to.min(most);
+            shell.clear();
+            self.within(p, radius, |i, q, distance| {
+                if distance > from {
+                    shell.push((distance, i, q));
+                }
+            });
+            shell.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            shell.dedup_by_key(|&mut (_, i, _)| i);
+            if shell.iter().any(|&(distance, i, q)| visit(i, q, distance)) {
+                return;
+            }
+            (from, to) = (radius, 2.0 * to);
+        }
+    }
+
+    /// No triangle is further than this from `p`.
+    fn whole(&self, p: DVec3) -> f64 {
+        self.side * (self.cells.iter().sum::<usize>() as f64 + 1.0) + p.distance(self.low)
+    }
+
     /// The nearest of the triangles, of several the first, and its point nearest to `p`; none if there are no triangles.
     pub fn nearest(&self, p: DVec3) -> Option<(u32, DVec3)> {
         if self.corners.is_empty() {
             return None;
         }
-        let whole = self.side * (self.cells.iter().sum::<usize>() as f64 + 1.0) + p.distance(self.low);
+        let whole = self.whole(p);
         let mut radius = self.side / 4.0;
         loop {
             let mut nearest: Option<(f64, u32, DVec3)> = None;

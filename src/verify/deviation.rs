@@ -1,13 +1,17 @@
 //! How far is an extracted mesh from the input, at every reference vertex and all over the boundary?
 
+use super::expected::{hash_of_tet, hashes_of_vertices};
 use super::mesh_checks::{PlainMesh, PlainReference};
 use super::parts::{Ask, change, is_aside};
-use crate::geom::{PointGrid, TetPlaces, TriangleGrid, weights_on_triangle};
+use super::surfaces::{Comparison, Distances, Surface};
+use crate::geom::{ON_LATTICE, PointGrid, TetPlaces, weights_on_triangle};
 use crate::mesh::{TetMesh, boundary_faces};
-use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, UpdateId};
+use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, FieldInfo, MtInfo, UpdateId};
 use crate::refine::{Need, Part};
+use foldhash::HashMap;
 use glam::DVec3;
-use std::collections::HashSet;
+use std::mem::take;
+use std::ops::Range;
 
 /// The input, prepared for being compared with.
 pub struct Deviation<'a> {
@@ -24,6 +28,19 @@ pub struct Deviation<'a> {
     stride: usize,
     /// Rounding errors of distances.
     slack: f64,
+    /// What was found out with earlier meshes: most of the next one is like them.
+    inside: Inside,
+    distances: Distances,
+}
+
+/// What is shown at the reference vertices inside of each tetrahedron that has been in a mesh.
+#[derive(Default)]
+struct Inside {
+    /// Where a tetrahedron's vertices are, by its hash.
+    of_tet: HashMap<u64, Range<usize>>,
+    points: Vec<u32>,
+    /// The interpolated values, as fractions of each field's range: `shown[i * fields + f]`.
+    shown: Vec<f64>,
 }
 
 /// What was found.
@@ -86,6 +103,8 @@ impl<'a> Deviation<'a> {
             boundary,
             stride,
             slack,
+            inside: Inside::default(),
+            distances: Distances::default(),
         })
     }
 
@@ -106,19 +125,29 @@ impl<'a> Deviation<'a> {
     }
 
     /// Measures `mesh` where needs apply. `errors` are those of its tetrahedra.
-    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &TetErrors, asks: &[Ask<'_>]) -> Measured {
+    pub fn measure(&mut self, mesh: &PlainMesh<'_>, errors: &TetErrors, asks: &[Ask<'_>]) -> Measured {
+        let (mut inside, mut distances) = (take(&mut self.inside), take(&mut self.distances));
         let border = Border::of(mesh, self.info);
         let largest = errors.codes.iter().copied().max().unwrap_or_default().error();
         let look = Look { of: self, mesh, border, errors, largest, asks };
         let mut found = Measured { worst_ratio: 0.0, failures: Vec::new() };
-        look.at_vertices(&mut found);
+        look.at_vertices(&mut inside, &mut found);
         // Elsewhere the boundary may be anywhere.
         if asks.iter().any(|ask| matches!(ask.need.part, Part::Everywhere | Part::Region(_))) {
-            let (ours, theirs) = (&look.border.surface, &self.boundary);
-            look.compare_surfaces(ours, theirs, "the extracted boundary", &mut found);
-            look.compare_surfaces(theirs, ours, "the input's boundary", &mut found);
+            let (stride, slack) = (look.of.stride, look.of.slack);
+            let comparison = Comparison { info: look.of.info, asks, stride, slack };
+            comparison.both_ways(&look.border.surface, &look.of.boundary, &mut distances, &mut found);
         }
+        (self.inside, self.distances) = (inside, distances);
         found
+    }
+
+    /// Whether the lattice has a reference vertex exactly where it is, with these levels.
+    fn is_exactly(&self, point: u32, levels: &[i32]) -> bool {
+        let point = point as usize;
+        let position = DVec3::from_array(self.points.points()[point].map(f64::from));
+        self.places[point].distance(position) < ON_LATTICE
+            && self.levels[point * levels.len()..][..levels.len()] == *levels
     }
 }
 
@@ -175,50 +204,105 @@ struct Look<'a> {
 }
 
 /// A place in the mesh that represents a reference vertex.
-struct Place {
+struct Place<'a> {
     tet: u32,
-    weights: [f64; 4],
+    /// The values there, as fractions of each field's range.
+    shown: &'a [f64],
     /// Its distance from the vertex, as the error that it counts as.
     displaced: f64,
 }
 
 impl Look<'_> {
     /// The error at every reference vertex to which a need applies.
-    fn at_vertices(&self, found: &mut Measured) {
-        let points = self.of.points.points().len();
-        // For each need and vertex, the least part of what is allowed.
-        let mut least = vec![f64::INFINITY; points * self.asks.len()];
+    fn at_vertices(&self, inside: &mut Inside, found: &mut Measured) {
+        let asks = self.asks.len();
+        // For each vertex and need, the least part of what is allowed.
+        let mut least = vec![f64::INFINITY; self.of.points.points().len() * asks];
+        self.at_common_vertices(&mut least);
+        let hashes = hashes_of_vertices(self.mesh.mesh);
+        let fields = self.of.info.fields.len();
         for (t, tet) in (0..).zip(self.mesh.tets) {
-            let corners = tet.map(|v| self.mesh.positions[v as usize]);
-            let mut places = None;
-            self.of.points.near_tet(&corners, |point| {
-                let asked = |ask: &Ask<'_>| ask.allowed[point as usize] < f64::INFINITY;
-                if !self.asks.iter().any(asked) {
-                    return;
+            let key = hash_of_tet(tet.map(|v| hashes[v as usize]));
+            let range = match inside.of_tet.get(&key) {
+                Some(range) => range.clone(),
+                None => self.locate(tet, key, inside),
+            };
+            for i in range {
+                let point = inside.points[i];
+                let place = Place { tet: t, shown: &inside.shown[i * fields..][..fields], displaced: 0.0 };
+                let least = &mut least[point as usize * asks..][..asks];
+                for (ask, least) in self.asks.iter().zip(least) {
+                    if ask.allowed[point as usize] < f64::INFINITY {
+                        *least = least.min(self.ratio(ask, point, &place));
+                    }
                 }
-                let (position, place) =
-                    (self.of.points.points()[point as usize], self.of.places[point as usize]);
-                let places = places.get_or_insert_with(|| TetPlaces::new(corners));
-                let Some(weights) = places.weights(position, place) else { return };
-                let least = &mut least[point as usize * self.asks.len()..][..self.asks.len()];
-                let place = Place { tet: t, weights, displaced: 0.0 };
-                for (ask, least) in self.asks.iter().zip(least).filter(|(ask, _)| asked(ask)) {
-                    *least = least.min(self.ratio(ask, point, &place));
-                }
-            });
+            }
         }
         for (k, ask) in self.asks.iter().enumerate() {
             let mut failures = Failures::default();
-            for point in (0..points).filter(|&point| ask.allowed[point] < f64::INFINITY) {
-                let inside = least[point * self.asks.len() + k];
+            for (point, &allowed) in ask.allowed.iter().enumerate() {
+                if allowed == f64::INFINITY {
+                    continue;
+                }
+                let inside = least[point * asks + k];
                 // A vertex inside of the mesh has one place; only one outside of the moved boundary has a choice.
-                let ratio = if inside.is_finite() { inside } else { self.ratio_at_border(ask, point as u32) };
+                let at_border = || self.ratio_at_border(ask, point as u32, found.worst_ratio.min(1.0));
+                let ratio = if inside.is_finite() { inside } else { at_border() };
                 found.worst_ratio = found.worst_ratio.max(ratio);
                 if ratio > 1.0 {
                     failures.add(|| self.describe(ask, point, inside, ratio));
                 }
             }
             failures.end("reference vertices", found);
+        }
+    }
+
+    /// The error where a vertex of the mesh is one of the input: what the levels round off.
+    fn at_common_vertices(&self, least: &mut [f64]) {
+        let mut shown = Vec::new();
+        for (slot, &position) in (0..).zip(self.mesh.positions) {
+            let levels = self.mesh.mesh.levels(slot);
+            for point in self.of.points.at(position).filter(|&point| self.of.is_exactly(point, levels)) {
+                shown.clear();
+                shown.extend(self.of.info.fields.iter().zip(levels).map(shown_at));
+                let least = &mut least[point as usize * self.asks.len()..][..self.asks.len()];
+                for (ask, least) in self.asks.iter().zip(least) {
+                    *least = self.error(ask, point, &shown, 0.0) / ask.allowed[point as usize];
+                }
+            }
+        }
+    }
+
+    /// Finds out which reference vertices are inside of a tetrahedron, but for common ones at its corners, and what is shown there.
+    fn locate(&self, tet: &[u32; 4], key: u64, inside: &mut Inside) -> Range<usize> {
+        let corners = tet.map(|v| self.mesh.positions[v as usize]);
+        let is_corner = |point: u32, position: [i32; 3]| {
+            let mut at = (0..4).filter(|&i| corners[i] == position);
+            at.any(|i| self.of.is_exactly(point, self.mesh.mesh.levels(tet[i])))
+        };
+        let first = inside.points.len();
+        let mut places = None;
+        self.of.points.near_tet(&corners, |point| {
+            let (position, place) = (self.of.points.points()[point as usize], self.of.places[point as usize]);
+            if point as usize % self.of.stride != 0 || is_corner(point, position) {
+                return;
+            }
+            let places = places.get_or_insert_with(|| TetPlaces::new(corners));
+            if let Some(weights) = places.weights(position, place) {
+                inside.points.push(point);
+                self.interpolate(tet, weights, &mut inside.shown);
+            }
+        });
+        let range = first..inside.points.len();
+        inside.of_tet.insert(key, range.clone());
+        range
+    }
+
+    /// Appends the values at a place in a tetrahedron, as fractions of each field's range.
+    fn interpolate(&self, tet: &[u32; 4], weights: [f64; 4], shown: &mut Vec<f64>) {
+        for (f, field) in self.of.info.fields.iter().enumerate() {
+            let at = |(&v, w): (&u32, f64)| shown_at((field, &self.mesh.mesh.levels(v)[f])) * w;
+            shown.push(tet.iter().zip(weights).map(at).sum());
         }
     }
 
@@ -235,168 +319,106 @@ impl Look<'_> {
 
     /// The error of a place that represents a reference vertex, as a fraction of the allowed one; 0 if the vertex is on
     /// one side of all values of the need.
-    fn ratio(&self, ask: &Ask<'_>, point: u32, place: &Place) -> f64 {
-        let fields = &self.of.info.fields;
-        let tet = self.mesh.tets[place.tet as usize];
-        let known = &self.of.values[point as usize * fields.len()..][..fields.len()];
+    fn ratio(&self, ask: &Ask<'_>, point: u32, place: &Place<'_>) -> f64 {
         let named = ask.values().map(|values| values.field).or(ask.need.measured_field());
         let error = self.errors.error(place.tet, named);
         let near = place.displaced <= error;
         if let Some(values) = ask.values() {
-            let (info, value) = (&fields[values.field], known[values.field] * fields[values.field].range());
+            let info = &self.of.info.fields[values.field];
+            let value = self.known(point)[values.field] * info.range();
+            let tet = self.mesh.tets[place.tet as usize];
             if near && is_aside(info, values, self.mesh, tet, error, value) {
                 return 0.0;
             }
         }
-        let shown = |f: usize| {
-            let value = |v: u32| fields[f].value(self.mesh.mesh.levels(v)[f]) / fields[f].range();
-            tet.iter().zip(place.weights).map(|(&v, w)| value(v) * w).sum::<f64>()
-        };
-        let found = if let Part::Transfer(transfer) = &ask.need.part {
-            let (f, info) = (transfer.field, &fields[transfer.field]);
-            let range = info.range();
-            if near { change(info, transfer, known[f] * range, shown(f) * range) } else { f64::INFINITY }
-        } else {
-            let measured = ask.need.measured_field().map_or(0..fields.len(), |field| field..field + 1);
-            measured.map(|f| (shown(f) - known[f]).abs()).fold(place.displaced, f64::max)
-        };
+        let is_known = near || !ask.is_of_colour();
+        let found =
+            if is_known { self.error(ask, point, place.shown, place.displaced) } else { f64::INFINITY };
         found / ask.allowed[point as usize]
     }
 
+    /// The error of showing these values so far from a reference vertex, in the unit of the need.
+    fn error(&self, ask: &Ask<'_>, point: u32, shown: &[f64], displaced: f64) -> f64 {
+        let known = self.known(point);
+        if let Part::Transfer(transfer) = &ask.need.part {
+            let info = &self.of.info.fields[transfer.field];
+            let [wanted, shown] = [known, shown].map(|values| values[transfer.field] * info.range());
+            return change(info, transfer, wanted, shown);
+        }
+        let measured = ask.need.measured_field().map_or(0..known.len(), |field| field..field + 1);
+        measured.map(|f| (shown[f] - known[f]).abs()).fold(displaced, f64::max)
+    }
+
+    /// The values that the input has at a vertex, as fractions of each field's range.
+    fn known(&self, point: u32) -> &[f64] {
+        let fields = self.of.info.fields.len();
+        &self.of.values[point as usize * fields..][..fields]
+    }
+
     /// The least error, as a fraction of the allowed one, of the places on the boundary that may represent a reference
-    /// vertex.
-    fn ratio_at_border(&self, ask: &Ask<'_>, point: u32) -> f64 {
+    /// vertex; if that is less than `enough`, anything from there to `enough`.
+    fn ratio_at_border(&self, ask: &Ask<'_>, point: u32, enough: f64) -> f64 {
         let p = DVec3::from(self.of.input.positions[point as usize]);
         let per_error = self.of.info.displacement_per_error;
         let allowed = ask.allowed[point as usize];
         // Tetrahedra without these values, or with no visible change of colour, may have any error.
-        let reach = match &ask.need.part {
-            Part::Transfer(_) => self.largest,
-            Part::Values(_) | Part::Both(..) => allowed.max(self.largest),
-            Part::View(_) => allowed.min(self.largest),
-            Part::Everywhere | Part::Region(_) => allowed,
+        let (reach, counts) = match &ask.need.part {
+            Part::Transfer(_) => (self.largest, false),
+            Part::Values(_) | Part::Both(..) => (allowed.max(self.largest), false),
+            Part::View(_) => (allowed.min(self.largest), true),
+            Part::Everywhere | Part::Region(_) => (allowed, true),
         };
-        let mut least = f64::INFINITY;
         // The rounding of the vertex to the lattice is no displacement.
         let moved =
             p.distance(DVec3::from(self.of.info.lattice.point(self.of.points.points()[point as usize])));
         let slack = moved + self.of.slack;
-        self.border.surface.triangles.within(p, reach * per_error + slack, |i, q, distance| {
+        let displaced = |distance: f64| if distance > slack { (distance - slack) / per_error } else { 0.0 };
+        let mut least = f64::INFINITY;
+        let mut shown = Vec::new();
+        self.border.surface.triangles.outwards(p, reach * per_error + slack, |i, q, distance| {
+            let displaced = displaced(distance);
+            // Those to come are further away.
+            if least <= enough || counts && displaced >= least * allowed {
+                return true;
+            }
             let (t, face) = self.border.faces[i as usize];
-            let tet = self.mesh.tets[t as usize];
-            let away = (distance - slack).max(0.0);
-            let displaced = if away > 0.0 { away / per_error } else { 0.0 };
+            let tet = &self.mesh.tets[t as usize];
             let own = weights_on_triangle(q, self.border.surface.triangles.corners[i as usize]);
             let weights = tet.map(|v| face.iter().zip(own).find(|(w, _)| **w == v).map_or(0.0, |(_, x)| x));
-            least = least.min(self.ratio(ask, point, &Place { tet: t, weights, displaced }));
+            shown.clear();
+            self.interpolate(tet, weights, &mut shown);
+            least = least.min(self.ratio(ask, point, &Place { tet: t, shown: &shown, displaced }));
+            false
         });
         least
     }
-
-    /// Whether a boundary is near the other one, at the [`PLACES`] of its faces.
-    fn compare_surfaces(&self, one: &Surface, other: &Surface, what: &str, found: &mut Measured) {
-        let mut failures = Failures::default();
-        // The next place is likely near the same triangle.
-        let mut first = 0;
-        let [origin, step] = [self.of.info.lattice.origin, self.of.info.lattice.step].map(DVec3::from);
-        // Faces around an edge or a vertex have it in common.
-        let mut seen = HashSet::new();
-        for face in one.faces.iter().step_by(self.of.stride).filter(|face| !other.has.contains(*face)) {
-            // The place that is furthest away.
-            let mut worst = (0.0, String::new());
-            for (sort, sixths) in places(face) {
-                if !seen.insert(sixths) {
-                    continue;
-                }
-                let p = origin + step * DVec3::from(sixths.map(|q| q as f64 / 6.0));
-                let binding = self.asks.iter().filter(|ask| ask.binds_boundary_at(p.to_array()));
-                let bound = binding.map(|ask| ask.bound).fold(f64::INFINITY, f64::min);
-                if bound == f64::INFINITY {
-                    continue;
-                }
-                let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
-                // Where that is no more than elsewhere, it need not be known how near the nearest triangle is.
-                let enough = if bound > 0.0 { allowed * found.worst_ratio.min(1.0) } else { allowed };
-                if let Some(near) = other.triangles.any_within(p, enough, first) {
-                    first = near;
-                    continue;
-                }
-                let distance = other.triangles.nearest(p).map_or(f64::INFINITY, |(_, q)| p.distance(q));
-                if bound > 0.0 {
-                    found.worst_ratio = found.worst_ratio.max(distance / allowed);
-                }
-                if distance > allowed && distance > worst.0 {
-                    let at = p.to_array();
-                    let failure = format!(
-                        "{sort} of {what} at {at:?} is {distance} from the other, more than {allowed}"
-                    );
-                    worst = (distance, failure);
-                }
-            }
-            if worst.0 > 0.0 {
-                failures.add(|| worst.1);
-            }
-        }
-        failures.end(&format!("faces of {what}"), found);
-    }
 }
 
-/// Parts of the corners, in sixths, of each place where the face of a boundary is compared with another boundary.
-const PLACES: [(&str, [i64; 3]); 7] = [
-    ("vertex", [6, 0, 0]),
-    ("vertex", [0, 6, 0]),
-    ("vertex", [0, 0, 6]),
-    ("middle", [3, 3, 0]),
-    ("middle", [0, 3, 3]),
-    ("middle", [3, 0, 3]),
-    ("middle", [2, 2, 2]),
-];
-
-/// These places of a face, in sixths of a step of the lattice: exact, so that all faces around an edge agree about its middle.
-fn places(face: &[[i32; 3]; 3]) -> [(&'static str, [i64; 3]); 7] {
-    let mean = |parts: [i64; 3], i: usize| (0..3).map(|k| parts[k] * i64::from(face[k][i])).sum();
-    PLACES.map(|(sort, parts)| (sort, [0, 1, 2].map(|i| mean(parts, i))))
+/// What a vertex with this level shows, as a fraction of the field's range.
+fn shown_at((field, &level): (&FieldInfo, &i32)) -> f64 {
+    field.value(level) / field.range()
 }
 
 /// Failures of one kind: the first ones in full, and their number.
 #[derive(Default)]
-struct Failures {
+pub struct Failures {
     described: Vec<String>,
     count: usize,
 }
 
 impl Failures {
-    fn add(&mut self, describe: impl FnOnce() -> String) {
+    pub fn add(&mut self, describe: impl FnOnce() -> String) {
         self.count += 1;
         if self.count <= DESCRIBED {
             self.described.push(describe());
         }
     }
 
-    fn end(mut self, where_: &str, found: &mut Measured) {
+    pub fn end(mut self, where_: &str, found: &mut Measured) {
         if self.count > DESCRIBED {
             self.described.push(format!("so at {} {where_}", self.count));
         }
         found.failures.append(&mut self.described);
-    }
-}
-
-/// A boundary.
-struct Surface {
-    /// Its faces, in model units.
-    triangles: TriangleGrid,
-    /// The same on the lattice, corners ascending, and as a set: faces that two boundaries share need not be compared.
-    faces: Vec<[[i32; 3]; 3]>,
-    has: HashSet<[[i32; 3]; 3]>,
-}
-
-impl Surface {
-    fn new(info: &MtInfo, faces: impl Iterator<Item = [[i32; 3]; 3]>) -> Self {
-        let mut faces: Vec<[[i32; 3]; 3]> = faces.collect();
-        let at = |q: [i32; 3]| DVec3::from(info.lattice.point(q));
-        let triangles = TriangleGrid::new(faces.iter().map(|face| face.map(at)).collect());
-        faces.iter_mut().for_each(|face| face.sort_unstable());
-        Self { triangles, has: faces.iter().copied().collect(), faces }
     }
 }
 

@@ -77,10 +77,15 @@ impl Expected {
     }
 }
 
+/// The hash of each vertex of a packed mesh.
+pub fn hashes_of_vertices(mesh: &CurrentMesh) -> Vec<u64> {
+    let of_vertex = |(slot, &p): (u32, &[i32; 3])| hash_of_vertex(mesh.vertex(slot), p, mesh.levels(slot));
+    (0..).zip(mesh.positions()).map(of_vertex).collect()
+}
+
 /// The hash of a packed mesh.
 pub fn hash(mesh: &CurrentMesh) -> u64 {
-    let of_vertex = |(slot, &p): (u32, &[i32; 3])| hash_of_vertex(mesh.vertex(slot), p, mesh.levels(slot));
-    let vertices: Vec<u64> = (0..).zip(mesh.positions()).map(of_vertex).collect();
+    let vertices = hashes_of_vertices(mesh);
     sum(mesh.tets().iter().map(|tet| hash_of_tet(tet.map(|v| vertices[v as usize]))))
 }
 
@@ -89,8 +94,8 @@ fn hash_of_vertex(v: VertexId, position: [i32; 3], levels: &[i32]) -> u64 {
     words.fold(u64::from(v.0), |h, word| mix(h ^ u64::from(word)))
 }
 
-/// The same in any order of the corners.
-fn hash_of_tet([a, b, c, d]: [u64; 4]) -> u64 {
+/// The hash of a tetrahedron by those of its corners, the same in any order of them.
+pub fn hash_of_tet([a, b, c, d]: [u64; 4]) -> u64 {
     mix(a.wrapping_add(b).wrapping_add(c).wrapping_add(d) ^ mix(a ^ b ^ c ^ d))
 }
 

@@ -39,6 +39,7 @@ mod queries;
 mod same;
 mod samples;
 mod shown;
+mod surfaces;
 
 pub use samples::{SampleRequest, run_request, samples};
 pub use shown::run_shown;
@@ -203,7 +204,7 @@ fn verify<M: ApplyUpdates>(
     on_progress: &mut dyn FnMut(u32, u32),
     report: &mut VerifyReport,
 ) -> Result<(), String> {
-    let deviation = Deviation::new(mt.info(), input, *vertices)?;
+    let mut deviation = Deviation::new(mt.info(), input, *vertices)?;
     let untouched = fresh(mt)?;
     let (reference, base) = check_full_circle(mt, &deviation, report)?;
     check_order(mt, report);
@@ -219,8 +220,12 @@ fn verify<M: ApplyUpdates>(
         let outcome = walk.answer(query, report)?;
         excesses[i] = outcome.excess;
         report.queries += 1;
-        Case { mt, query, front: &walk.front, outcome: &outcome }
-            .check(&base, &reference, &deviation, report);
+        Case { mt, query, front: &walk.front, outcome: &outcome }.check(
+            &base,
+            &reference,
+            &mut deviation,
+            report,
+        );
         let hash = expected::hash(walk.front.mesh());
         if hash == expected.hash(mt, &base, query)? {
             walk.ask_again(query, hash, report)?;
@@ -404,7 +409,7 @@ impl<M: ApplyUpdates> Case<'_, M> {
         &self,
         base: &Front,
         reference: &mesh_checks::Shape,
-        deviation: &Deviation<'_>,
+        deviation: &mut Deviation<'_>,
         report: &mut VerifyReport,
     ) {
         let mesh = PlainMesh::of(self.front.mesh());

@@ -107,7 +107,7 @@ fn check<M: ApplyUpdates>(
         }
         None => Near::sparse(input)?,
     };
-    let deviation = Deviation::of(info, &near.mesh, near.faces.clone(), most)?;
+    let mut deviation = Deviation::of(info, &near.mesh, near.faces.clone(), most)?;
     let base = fresh(mt)?;
     let plain = PlainMesh::of(base.mesh());
     let shape = Shape::of(&PlainReference { positions: plain.positions, levels: &[], tets: plain.tets })
@@ -117,7 +117,7 @@ fn check<M: ApplyUpdates>(
     if outcome.missing {
         note(report, &query, "blocks that it needs are not here");
     }
-    Case { mt, query: &query, front: &front, outcome: &outcome }.check(&base, &shape, &deviation, report);
+    Case { mt, query: &query, front: &front, outcome: &outcome }.check(&base, &shape, &mut deviation, report);
     report.queries += 1;
     if let Some((inside, need)) = around.filter(|(_, need)| matches!(need.part, Part::Region(_))) {
         let inside = Inside { info, near: &near, inside, mesh: PlainMesh::of(front.mesh()) };

@@ -2,51 +2,11 @@
 
 use crate::mesh::FACES;
 use crate::mt::mesh::KindState;
-use std::collections::HashMap;
-use std::hash::{BuildHasher, Hasher, RandomState};
+use foldhash::HashMap;
 
 /// The faces of a set of tetrahedra: how often each is used from either side.
 #[derive(Clone, Debug, Default)]
-pub(in crate::mt) struct Faces(HashMap<[u32; 3], [u8; 2], Folding>);
-
-/// Hashes faces quickly, by a key that files cannot know beforehand.
-#[derive(Clone, Debug)]
-struct Folding(u64);
-
-impl Default for Folding {
-    fn default() -> Self {
-        Self(RandomState::new().hash_one(0))
-    }
-}
-
-impl BuildHasher for Folding {
-    type Hasher = Fold;
-
-    fn build_hasher(&self) -> Fold {
-        Fold(self.0)
-    }
-}
-
-/// Multiplies to twice the width and folds the halves.
-struct Fold(u64);
-
-impl Hasher for Fold {
-    fn write(&mut self, bytes: &[u8]) {
-        for word in bytes.chunks(8) {
-            let word = word.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte));
-            let wide = u128::from(self.0 ^ word) * 0x9E37_79B9_7F4A_7C15;
-            self.0 = wide as u64 ^ (wide >> 64) as u64;
-        }
-    }
-
-    fn write_usize(&mut self, _: usize) {
-        // Lengths: all faces have three vertices.
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
-}
+pub(in crate::mt) struct Faces(HashMap<[u32; 3], [u8; 2]>);
 
 impl Faces {
     /// Adds the faces of a tetrahedron. False if one of them is occupancy on that side; they are added all the same.
