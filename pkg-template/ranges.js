@@ -25,7 +25,7 @@ const LATE = 100;
 /**
  * @typedef {object} RangesOptions
  * @property {typeof fetch} [fetch] used in place of the global one, for instance to sign requests
- * @property {HeadersInit} [headers] go along with each request; other origins must allow them
+ * @property {HeadersInit} [headers] go along with each request to the origin of the address; it must allow them
  * @property {RequestCredentials} [credentials]
  * @property {FirstResponse} [first] keeps the first response, or has that of a session before
  * @property {SharedRanges} [shared] ranges that several sessions of one file have, in place of `cache`
@@ -54,6 +54,8 @@ export class Ranges {
   #url;
   /** Where redirects led to. */
   #ledTo;
+  /** Whether other origins that redirects led to are asked directly. They are not sent the caller's headers; some refuse without. */
+  #asksOthers = true;
   #options;
   #sink;
   /** @type {Map<number, AbortController>} */
@@ -84,6 +86,8 @@ export class Ranges {
     this.#loader = new RangeLoader(maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs, Math.random());
     this.#url = this.#ledTo = new URL(url, globalThis.location?.href).href;
     this.#options = options;
+    // What the caller's own function puts into a request is meant for the address that was given.
+    if (options.fetch) this.#asksOthers = false;
     this.#sink = sink;
   }
 
@@ -264,9 +268,10 @@ export class Ranges {
     if (GONE.includes(response.status) && url !== this.#url) {
       // Addresses that redirects lead to may be good for a while only.
       if (this.#ledTo === url) this.#ledTo = this.#url;
+      if (this.#options.headers && !this.#isOwn(url)) this.#asksOthers = false;
       throw new Error(`HTTP ${response.status} where a redirect led to`);
     }
-    if (response.ok && response.url) this.#ledTo = response.url;
+    if (response.ok && response.url && (this.#isOwn(response.url) || this.#asksOthers)) this.#ledTo = response.url;
     const fields = FIELDS.map((name) => response.headers.get(name));
     const pieces = this.#options.first?.record(start, end, response.status, fields);
     if (!tell((now) => this.#loader.head(id, now, response.status, fields))) return;
@@ -285,10 +290,16 @@ export class Ranges {
     if (pieces.every((bytes) => tell((now) => this.#loader.data(id, now, bytes)))) tell((now) => this.#loader.end(id, now));
   }
 
+  /** Whether an address is of the same origin as the given one. */
+  #isOwn(url) {
+    return new URL(url).origin === new URL(this.#url).origin;
+  }
+
   #request(url, start, end, signal) {
     // Without an end where it is not known: such numbers are no integers any more.
     const last = Number.isSafeInteger(end) ? end - 1 : "";
-    const headers = new Headers(this.#options.headers);
+    // Whoever a server redirects to must not learn what the caller tells that server.
+    const headers = new Headers(this.#isOwn(url) ? this.#options.headers : undefined);
     headers.set("range", `bytes=${start}-${last}`);
     const call = this.#options.fetch ?? globalThis.fetch;
     // A browser's own cache serves ranges of one address one after the other, and may mix versions.

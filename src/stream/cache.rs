@@ -3,11 +3,14 @@
 //! Nothing depends on it: what cannot be read or does not match its checksum is fetched again, what cannot be written
 //! is not kept. Several programs may use one folder.
 
+use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
+use tempfile::NamedTempFile;
 
 /// A folder of ranges that takes no more than so many bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,8 +34,8 @@ impl Cache {
     /// What is kept of `version` of the file at `url`. Older versions go, as does what was used least lately when the
     /// folder is full.
     pub fn open(options: &CacheFolder, url: &str, version: &str) -> Self {
-        let of_url = options.path.join(format!("{:016x}", hash(url.as_bytes())));
-        let folder = of_url.join(format!("{:016x}", hash(version.as_bytes())));
+        let of_url = options.path.join(hash(url));
+        let folder = of_url.join(hash(version));
         for other in entries(&of_url).filter(|other| *other != folder) {
             let _ = fs::remove_dir_all(other);
         }
@@ -73,10 +76,12 @@ impl Cache {
 
     fn write(&self, range: &Range<u64>, bytes: &[u8]) -> std::io::Result<()> {
         fs::create_dir_all(&self.folder)?;
-        let partial = self.folder.join(format!("{}.{}", name(range), std::process::id()));
-        fs::write(&partial, [&crc32fast::hash(bytes).to_le_bytes(), bytes].concat())?;
+        let mut partial = NamedTempFile::new_in(&self.folder)?;
+        partial.write_all(&crc32fast::hash(bytes).to_le_bytes())?;
+        partial.write_all(bytes)?;
         // Whole or not at all, for other programs too.
-        fs::rename(&partial, self.folder.join(name(range)))
+        partial.persist(self.folder.join(name(range)))?;
+        Ok(())
     }
 }
 
@@ -96,11 +101,9 @@ fn checked(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
     (crc32fast::hash(&bytes) == sum).then_some(bytes)
 }
 
-/// FNV-1a (Fowler, Noll, Vo 1991): names folders, guards nothing.
-fn hash(bytes: &[u8]) -> u64 {
-    bytes
-        .iter()
-        .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3))
+/// Names a folder. Nobody can find another address or version with the same hash: what one server sent is never taken for what another has.
+fn hash(text: &str) -> String {
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> {

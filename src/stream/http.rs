@@ -14,7 +14,8 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 use ureq::http::{Response, header};
-use ureq::{Agent, Body, ResponseExt};
+use ureq::{Agent, Body};
+use url::Url;
 
 /// Bytes that are read at a time.
 const CHUNK: usize = 64 << 10;
@@ -27,7 +28,8 @@ const WAITING: usize = 32;
 pub struct HttpOptions {
     /// How requests are made and tried again.
     pub loader: LoaderOptions,
-    /// Headers that go along with each, such as `Authorization`.
+    /// Headers that go along with each request to the origin of the address, such as `Authorization`. Another origin that a redirect
+    /// leads to is not sent them.
     pub headers: Vec<(String, String)>,
     /// Where ranges are kept for the next time, if anywhere.
     pub cache: Option<CacheFolder>,
@@ -45,6 +47,8 @@ pub struct HttpSource {
     /// Where the file was asked for, and where redirects led to.
     given: String,
     led_to: String,
+    /// Whether other origins that redirects led to are asked directly: not if one has refused without the headers.
+    asks_others: bool,
     events: Receiver<Event>,
     sender: SyncSender<Event>,
     open: Vec<(u32, Arc<AtomicBool>)>,
@@ -88,9 +92,9 @@ const FIELDS: [header::HeaderName; 7] = [
 
 impl OwnedResponseHead {
     /// Packed answers are unpacked on the way, and their head says neither that nor the length any more.
-    fn of(asked: &str, response: &Response<Body>) -> Self {
+    fn of(asked: &str, led_to: String, response: &Response<Body>) -> Self {
         let field = |name| Some(response.headers().get(name)?.to_str().ok()?.to_owned());
-        let (asked, led_to) = (asked.to_owned(), response.get_uri().to_string());
+        let asked = asked.to_owned();
         Self { asked, led_to, status: response.status().as_u16(), fields: FIELDS.map(field) }
     }
 
@@ -118,10 +122,11 @@ impl HttpSource {
         let (sender, events) = mpsc::sync_channel(WAITING);
         Self {
             loader: Loader::new(options.loader),
-            client: Client::new(&options),
+            client: Client::new(url, &options),
             options,
             given: url.to_owned(),
             led_to: url.to_owned(),
+            asks_others: true,
             events,
             sender,
             open: Vec::new(),
@@ -205,11 +210,13 @@ impl HttpSource {
             if self.led_to == head.asked {
                 self.led_to.clone_from(&self.given);
             }
+            self.asks_others &= self.options.headers.is_empty() || is_same_origin(&head.asked, &self.given);
             let expired = Failure::Network(format!("HTTP {} where a redirect led to", head.status));
             return self.loader.failed(id, self.now(), expired);
         }
         self.loader.head(id, self.now(), &head.head());
-        if matches!(head.status, 200 | 206) {
+        let is_asked = self.asks_others || is_same_origin(&head.led_to, &self.given);
+        if matches!(head.status, 200 | 206) && is_asked {
             self.led_to.clone_from(&head.led_to);
         }
     }
@@ -293,16 +300,23 @@ impl Drop for HttpSource {
 #[derive(Clone, Debug)]
 struct Client {
     agent: Agent,
+    /// The address that was given, and what its origin is sent.
+    given: Arc<str>,
     headers: Arc<[(String, String)]>,
 }
 
+/// So many redirects are followed, one after the other.
+const MAX_REDIRECTS: usize = 8;
+
 impl Client {
-    fn new(options: &HttpOptions) -> Self {
+    fn new(given: &str, options: &HttpOptions) -> Self {
         // The loader gives up first; the thread must not stay for ever.
         let patience = Some(Duration::from_millis(options.loader.timeout_ms.saturating_add(1000)));
         let config = Agent::config_builder()
             .http_status_as_error(false)
-            .max_redirects(8)
+            // They are followed here, for other origins are not sent the same.
+            .max_redirects(0)
+            .max_redirects_will_error(false)
             .timeout_resolve(patience)
             .timeout_connect(patience)
             .timeout_recv_response(patience)
@@ -310,7 +324,39 @@ impl Client {
             .max_idle_connections_per_host(options.loader.max_requests)
             .user_agent(concat!("tetralod/", env!("CARGO_PKG_VERSION")))
             .accept_encoding("identity");
-        Self { agent: config.build().new_agent(), headers: options.headers.clone().into() }
+        let agent = config.build().new_agent();
+        Self { agent, given: given.into(), headers: options.headers.clone().into() }
+    }
+
+    /// The answer, after redirects, and where they led to.
+    fn ask(
+        &self,
+        url: &str,
+        range: &str,
+        if_match: Option<&str>,
+    ) -> Result<(String, Response<Body>), ureq::Error> {
+        let mut at = url.to_owned();
+        for _ in 0..=MAX_REDIRECTS {
+            let mut request = self.agent.get(&at).header(header::RANGE, range);
+            if is_same_origin(&at, &self.given) {
+                for (name, value) in self.headers.iter() {
+                    request = request.header(name, value);
+                }
+            }
+            if let Some(tag) = if_match {
+                request = request.header(header::IF_MATCH, tag);
+            }
+            let response = request.call()?;
+            let next = matches!(response.status().as_u16(), 301 | 302 | 303 | 307 | 308)
+                .then(|| response.headers().get(header::LOCATION)?.to_str().ok())
+                .flatten()
+                .and_then(|location| Url::parse(&at).ok()?.join(location).ok());
+            match next {
+                Some(next) => at = next.into(),
+                None => return Ok((at, response)),
+            }
+        }
+        Err(ureq::Error::TooManyRedirects)
     }
 
     /// One request from beginning to end; `report` returns whether the answer is still wanted.
@@ -323,21 +369,15 @@ impl Client {
     ) {
         // Without an end where it is not known: some servers read numbers as 32 or 53 bits.
         let last = if range.end == u64::MAX { String::new() } else { (range.end - 1).to_string() };
-        let mut request = self.agent.get(url).header(header::RANGE, format!("bytes={}-{last}", range.start));
-        for (name, value) in self.headers.iter() {
-            request = request.header(name, value);
-        }
-        if let Some(tag) = if_match {
-            request = request.header(header::IF_MATCH, tag);
-        }
-        let response = match request.call() {
-            Ok(response) => response,
+        let range = format!("bytes={}-{last}", range.start);
+        let (led_to, response) = match self.ask(url, &range, if_match.as_deref()) {
+            Ok(answer) => answer,
             Err(error) => {
                 report(What::Failed(failure(&error)));
                 return;
             }
         };
-        if !report(What::Head(Box::new(OwnedResponseHead::of(url, &response)))) {
+        if !report(What::Head(Box::new(OwnedResponseHead::of(url, led_to, &response)))) {
             return;
         }
         let mut body = response.into_body().into_reader();
@@ -355,6 +395,12 @@ impl Client {
             }
         }
     }
+}
+
+/// Whether two addresses have the scheme, the host and the port in common. Those that are none have not.
+fn is_same_origin(a: &str, b: &str) -> bool {
+    let [a, b] = [a, b].map(|url| Url::parse(url).map(|url| url.origin()));
+    matches!((a, b), (Ok(a), Ok(b)) if a == b)
 }
 
 fn failure(error: &ureq::Error) -> Failure {

@@ -105,6 +105,30 @@ test("ranges of another origin need no preflight, and no header but the one that
   assert.ok(asked.every(({ method }) => method === "GET"), JSON.stringify(asked));
 });
 
+test("headers of the caller go to no other origin", async () => {
+  const told = [];
+  const there = await listen((request, response) => {
+    if (request.method !== "OPTIONS") told.push(request.headers.authorization);
+    response.setHeader("access-control-allow-headers", "range, authorization");
+    if (request.method === "OPTIONS") response.setHeader("access-control-allow-origin", "*").end();
+    else serveFile(request, response);
+  });
+  const redirected = [];
+  const here = await listen((request, response) => {
+    response.setHeader("access-control-allow-origin", "*").setHeader("access-control-allow-headers", "range, authorization");
+    if (request.method === "OPTIONS") return response.end();
+    redirected.push(request.headers.authorization);
+    response.writeHead(302, { location: `${there}/exposed` }).end();
+  });
+  const url = base;
+  base = here;
+  const { sums, message } = await fetchIn("/x", RANGES, { headers: { authorization: "Bearer secret" } });
+  base = url;
+  assert.deepEqual(sums, expected, message);
+  assert.ok(redirected.length < told.length && redirected.every((header) => header === "Bearer secret"), JSON.stringify(redirected));
+  assert.ok(told.every((header) => header === undefined), JSON.stringify(told));
+});
+
 test("what the browser forbids is told from a server that is away", async () => {
   const closed = await fetchIn("/closed", RANGES);
   assert.equal(closed.code, "cors", closed.message);

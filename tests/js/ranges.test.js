@@ -239,6 +239,55 @@ test("redirects are followed once, and again when they expire", async () => {
   assert.ok(firsts > 1 && firsts < asked.length / 2, `redirected ${firsts} times`);
 });
 
+for (const lasts of [true, false]) {
+  const what = lasts ? "which is asked directly" : "and one that refuses without them is asked by way of the given one";
+  test(`headers of the caller go to no other origin, ${what}`, async () => {
+    const [told, used] = [[], new Set()];
+    const other = createServer((request, response) => {
+      told.push([request.headers.authorization, request.headers.range]);
+      const isNew = !used.has(request.url);
+      used.add(request.url);
+      const [, start, last] = /^bytes=(\d+)-(\d*)$/.exec(request.headers.range);
+      if (lasts || isNew) good({ start: Number(start), end: Math.min(Number(last) + 1, SIZE) }, response);
+      else response.writeHead(403).end();
+    });
+    await new Promise((resolve) => other.listen(0, "127.0.0.1", () => resolve(undefined)));
+    const there = `http://127.0.0.1:${/** @type {import("node:net").AddressInfo} */ (other.address()).port}`;
+    const redirect = (range, response) => response.writeHead(302, { location: `${there}/${range.number}` }).end();
+    try {
+      await works(20, redirect, { headers: { authorization: "Bearer secret" } });
+    } finally {
+      other.closeAllConnections();
+      other.close();
+    }
+    assert.ok(asked.every(({ headers }) => headers.authorization === "Bearer secret"));
+    assert.ok(told.every(([authorization]) => authorization === undefined), JSON.stringify(told));
+    if (lasts) assert.ok(asked.length < told.length, `redirected ${asked.length} of ${told.length} times`);
+    else assert.ok(told.length <= asked.length + 6, `${told.length} requests, ${asked.length} of them redirected`);
+  });
+}
+
+test("what the caller's own function makes of a request goes to the given address alone", async () => {
+  const other = createServer((request, response) => {
+    const [, start, last] = /^bytes=(\d+)-(\d*)$/.exec(request.headers.range);
+    good({ start: Number(start), end: Math.min(Number(last) + 1, SIZE) }, response);
+  });
+  await new Promise((resolve) => other.listen(0, "127.0.0.1", () => resolve(undefined)));
+  const there = `http://127.0.0.1:${/** @type {import("node:net").AddressInfo} */ (other.address()).port}`;
+  const called = [];
+  const sign = (url, init) => {
+    called.push(url);
+    return fetch(url, { ...init, headers: { ...Object.fromEntries(init.headers), "x-signature": "secret" } });
+  };
+  try {
+    await works(20, (_, response) => response.writeHead(302, { location: `${there}/` }).end(), { fetch: sign });
+  } finally {
+    other.closeAllConnections();
+    other.close();
+  }
+  assert.ok(called.length > 1 && called.every((url) => url.startsWith(base)), JSON.stringify(called));
+});
+
 test("no server is reported", async () => {
   const other = createServer();
   await new Promise((resolve) => other.listen(0, "127.0.0.1", () => resolve(undefined)));

@@ -1,6 +1,7 @@
 //! Promise: over real connections to a server that misbehaves, the right bytes come or an error that says what to do
 //! about it, after a bounded number of requests, and nothing hangs.
 
+use std::collections::HashSet;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::ops::Range;
@@ -31,6 +32,8 @@ struct Asked {
     path: String,
     range: Range<u64>,
     if_match: Option<String>,
+    /// What the caller sends along: `Authorization` and `X-Key`.
+    secrets: Vec<String>,
     /// How many came before.
     number: usize,
 }
@@ -106,7 +109,7 @@ fn read_request(reader: &mut impl BufRead) -> Option<Asked> {
     let mut line = String::new();
     reader.read_line(&mut line).ok()?;
     let path = line.split(' ').nth(1)?.to_owned();
-    let mut asked = Asked { path, range: 0..SIZE, if_match: None, number: 0 };
+    let mut asked = Asked { path, range: 0..SIZE, if_match: None, secrets: Vec::new(), number: 0 };
     loop {
         line.clear();
         reader.read_line(&mut line).ok()?;
@@ -118,6 +121,7 @@ fn read_request(reader: &mut impl BufRead) -> Option<Asked> {
                 asked.range = start.parse().ok()?..end;
             }
             "if-match" => asked.if_match = Some(value.to_owned()),
+            "authorization" | "x-key" => asked.secrets.push(value.to_owned()),
             "accept-encoding" => assert_eq!(value, "identity", "ranges of packed bytes are of no use"),
             _ => {}
         }
@@ -403,6 +407,54 @@ fn a_file_that_changes_is_noticed() {
     assert_eq!(fetch_from(&mut source, &WANTED), Err(StreamError::Changed));
     source.retry();
     fetch_from(&mut source, &WANTED).expect("the new version");
+}
+
+/// Fetches all from a server that redirects each request to an address of its own at another origin, which may be good for one request.
+fn through_another_origin(is_good_for_one: bool) -> [Server; 2] {
+    let secrets: [Arc<Mutex<Vec<Vec<String>>>>; 2] = Default::default();
+    let [told, told_there] = secrets.clone();
+    let used = Mutex::new(HashSet::new());
+    let there = Server::start(move |asked| {
+        told_there.lock().expect("a list").push(asked.secrets.clone());
+        let is_new = used.lock().expect("a set").insert(asked.path.clone());
+        if is_new || !is_good_for_one {
+            good(asked)
+        } else {
+            vec![head("403 Forbidden", "Content-Length: 0\r\n")]
+        }
+    });
+    let location = there.url.clone();
+    let here = Server::start(move |asked| {
+        told.lock().expect("a list").push(asked.secrets.clone());
+        vec![head("302 Found", &format!("Location: {location}?{}\r\nContent-Length: 0\r\n", asked.number))]
+    });
+    let headers = [("Authorization", "Bearer secret"), ("X-Key", "secret")];
+    let headers = headers.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
+    let mut source = HttpSource::new(&here.url, HttpOptions { headers, ..options() });
+    fetch_from(&mut source, &WANTED).expect("the ranges");
+    let [told, told_there] = secrets;
+    assert!(
+        told.lock().expect("a list").iter().all(|secrets| secrets.len() == 2),
+        "the given origin is told"
+    );
+    assert!(
+        told_there.lock().expect("a list").iter().all(Vec::is_empty),
+        "another one is told {told_there:?}"
+    );
+    [here, there]
+}
+
+#[test]
+fn headers_of_the_caller_go_to_no_other_origin() {
+    let [here, there] = through_another_origin(false);
+    assert!(here.requests() < there.requests(), "where it leads to is asked directly");
+}
+
+#[test]
+fn another_origin_that_refuses_without_the_headers_is_asked_by_way_of_the_given_one() {
+    let [here, there] = through_another_origin(true);
+    // Those that were asked for at the same time as the first one that is refused.
+    assert!(there.requests() <= here.requests() + options().loader.max_requests as usize);
 }
 
 #[test]
