@@ -164,16 +164,21 @@ pub(super) fn refused(name: &str, bytes: &[u8]) -> ReadReason {
     })
 }
 
-/// Refuses a file in HDF5 that has these members, if they are of another format than those that are read.
+/// Refuses a file in HDF5 whose root has these groups and datasets, if it is of another format than those that are read: Exodus has no
+/// groups. The library for netCDF follows each way to a group, of which a small file may have any number.
 #[cfg(feature = "hdf5")]
-pub(super) fn refuse_hdf5(members: &[String]) -> Result<(), ReadReason> {
-    let has = |name: &str| members.iter().any(|member| member == name);
+pub(super) fn refuse_hdf5(groups: &[String], datasets: &[String]) -> Result<(), ReadReason> {
+    let has = |name: &str| groups.iter().chain(datasets).any(|member| member == name);
     let (what, remedy) = if has("CGNSLibraryVersion") || has(" hdf5version") {
         CGNS
     } else if has("meshes") && has("settings") {
         FLUENT
     } else if has("ENS_MAA") {
         MED
+    } else if let Some(group) = groups.first() {
+        let what = format!("a file in HDF5 with the group \"{group}\", which is neither VTKHDF nor Exodus");
+        let remedy = "convert it to one of these with a tool that reads it; Exodus has all in the root, without groups".into();
+        return Err(ReadReason::Unsupported { what, remedy });
     } else {
         return Ok(());
     };

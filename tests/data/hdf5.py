@@ -96,5 +96,17 @@ def exodus():
     file.close()
 
 
-for write in [pieces, steps, image, exodus]:
+def cycles():
+    """A group that is its own member, and forty from each of which two ways lead to the next."""
+    with h5py.File("own_root.exo", "w", libver="latest") as file:
+        file["again"] = file["/"]
+    with h5py.File("many_ways.exo", "w", libver="latest") as file:
+        group = file
+        for _ in range(40):
+            child = group.create_group("a")
+            group["b"] = child
+            group = child
+
+
+for write in [pieces, steps, image, exodus, cycles]:
     write()

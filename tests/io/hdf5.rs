@@ -54,6 +54,18 @@ fn pieces_meet_and_what_has_no_volume_is_left_out() {
 }
 
 #[test]
+fn groups_that_lead_to_one_another_are_refused() {
+    let own_root = include_bytes!("../data/own_root.exo").as_slice();
+    let many_ways = include_bytes!("../data/many_ways.exo").as_slice();
+    for (bytes, group) in [(own_root, "again"), (many_ways, "\"a\"")] {
+        let error = io::read_bytes("x.exo", bytes).expect_err("it is no Exodus");
+        assert!(matches!(error.reason, ReadReason::Unsupported { .. }), "{error}");
+        assert!(error.to_string().contains(group), "{error}");
+        assert!(io::survey("x.exo", bytes).is_err());
+    }
+}
+
+#[test]
 fn image_data_is_a_grid() {
     let mesh = read_step(IMAGE, 0).unwrap();
     let grid = mesh.grid.unwrap();

@@ -110,7 +110,7 @@ fn content(storage: DynStorage) -> Result<Content, ReadError> {
         if root.0.iter().any(|name| name == vtkhdf::ROOT) {
             return Ok(Content::Vtkhdf(file));
         }
-        foreign::refuse_hdf5(&root.0).at(String::new)?;
+        foreign::refuse_hdf5(&root.0, &root.1).at(String::new)?;
     }
     let options = NcOpenOptions { max_read_bytes: limit, max_chunk_bytes: chunk, ..NcOpenOptions::default() };
     let file = NcFile::from_storage_with_options(storage, options);
