@@ -391,10 +391,12 @@ impl<'a> Parser<'a> {
             _ => return,
         };
         let Some(array) = array else { return };
-        if array.text.trim_ascii().is_empty() {
-            array.text = text;
-        } else if !text.trim_ascii().is_empty() {
+        // White space before the first number is left out; behind it, between comments, it separates numbers. Each piece of text is
+        // looked at once: there may be very many.
+        if !array.text.is_empty() {
             array.text.to_mut().push_str(&text);
+        } else if !text.trim_ascii_start().is_empty() {
+            array.text = text;
         }
     }
 

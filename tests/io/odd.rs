@@ -341,3 +341,26 @@ fn odd_inputs_have_their_right_values() {
         assert_eq!(mesh.fields.len(), 1, "{name}");
     }
 }
+
+#[test]
+fn comments_between_numbers_are_nothing_however_many() {
+    // The white space is looked at once, not again at each comment: that would take a minute.
+    let (space, comments) = (" ".repeat(1 << 20), "<!-- -->".repeat(1 << 17));
+    let file = |points: &str| {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points>\
+             <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{points}</DataArray></Points><Cells>\
+             <DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>\
+             <DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray>\
+             <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>"
+        )
+    };
+    let plain = read("plain.vtu", &file("0 0 0 1 0 0 0 1 0 0 0 1"));
+    for points in [
+        format!("0{space}{comments}0 0 1 0 0 0 1 0 0 0 1"),
+        format!("{space}{comments} {comments}0 0 0 1 0 0 0 1 0 0 0 1"),
+        "0 0 0<!-- --> <!-- -->1 0 0 0<!-- -->\n<!-- -->1 0 0 0 1".to_owned(),
+    ] {
+        assert_eq!(read("comments.vtu", &file(&points)), plain);
+    }
+}
