@@ -275,6 +275,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return finish(arguments, &config, (built, start), repaired_as(String::new()));
     }
     let (mut mesh, mut repaired) = options.read(&config, level, may_part)?;
+    // Inputs may name others.
+    files::check_output(output, &[])?;
     let [points, tetrahedra] = mesh.counts();
     let way = way(arguments, &config, [points, tetrahedra, kept_fields(&config, &mesh)], None)?;
     if way == Way::Whole && mesh.is_grid_alone() {
@@ -392,7 +394,7 @@ impl BuildOptions {
         let repaired = repaired.to_string();
         for line in [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)].into_iter().flatten() {
             if !line.is_empty() && !verbosity.quiet {
-                eprintln!("{}: {line}", self.name());
+                output::note(&format!("{}: {line}", self.name()));
             }
         }
         Ok(repair)
@@ -494,7 +496,7 @@ impl BuildOptions {
     /// Tells why pieces are read as a whole after all.
     pub fn tell(&self, why: &PartsError, verbosity: &Verbosity) {
         if !verbosity.quiet {
-            eprintln!("{}: {why}; so it is", self.name());
+            output::note(&format!("{}: {why}; so it is", self.name()));
         }
     }
 }
@@ -527,7 +529,7 @@ fn way(
     let what = format!("building {} tetrahedra takes about {}", count(tetrahedra), bytes(needed));
     let tell = |line: String| {
         if !verbosity.quiet {
-            eprintln!("{}: {line}", options.name());
+            output::note(&format!("{}: {line}", options.name()));
         }
     };
     if let Some(parts) = arguments.parts {

@@ -1,6 +1,6 @@
 //! Files in and out: MT files are read as far as they are needed, from disk or from a server; outputs appear whole or not at all.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use std::fs;
 use std::fs::File;
 use std::io::{BufWriter, Cursor, Seek, Write};
@@ -48,8 +48,20 @@ pub fn remove_partial_output_on_interrupt() -> Result<()> {
     ctrlc::set_handler(interrupted).context("the handler for Ctrl-C could not be set")
 }
 
+/// The inputs that were read, at their places without links.
+static INPUTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn inputs() -> MutexGuard<'static, Vec<PathBuf>> {
+    INPUTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Notes that these files were read: no output replaces them.
+pub fn note_inputs(files: &[PathBuf]) {
+    inputs().extend(files.iter().filter_map(|file| fs::canonicalize(file).ok()));
+}
+
 /// Refuses an output that is one of the inputs, or that has no place, before any work is done for it.
-pub fn check_output<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+pub fn check_output<'a>(path: &Path, given: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
     let name = path.display();
     if path == Path::new("-") {
         bail!("'-' is no name for a file; give one after -o, or /dev/stdout");
@@ -68,12 +80,23 @@ pub fn check_output<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBu
         is_same(input) || is_beside(input, &place) || names(input, &place)
     };
     // Pipes and devices are not replaced.
-    if let Some(input) = inputs.into_iter().find(is_it).filter(|_| found.is_file()) {
+    if let Some(input) = given.into_iter().find(is_it).filter(|_| found.is_file()) {
         bail!(
             "{name} is an input, too ({}), and would be replaced; give another file after -o",
             input.display()
         );
     }
+    check_inputs(path)
+}
+
+/// Refuses an output that is one of the files that were read, whoever named them.
+fn check_inputs(path: &Path) -> Result<()> {
+    let is_input = fs::canonicalize(path).is_ok_and(|place| place.is_file() && inputs().contains(&place));
+    ensure!(
+        !is_input,
+        "{} is an input, too, and would be replaced; give another file after -o",
+        path.display()
+    );
     Ok(())
 }
 
@@ -129,18 +152,20 @@ pub fn check_ending(path: &Path, format: &str) -> Result<()> {
 /// Writes the file at `path` with `write`; on any failure what was there before stays.
 pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<T>) -> Result<T> {
     let failed = || format!("{} could not be written", path.display());
+    check_inputs(path)?;
     // Pipes and devices cannot be replaced by a file.
     if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         let mut out = BufWriter::new(File::create(path).with_context(failed)?);
         return write(&mut out).and_then(|done| Ok(out.flush().map(|()| done)?)).with_context(failed);
     }
-    let partial_path = partial_path(path).with_context(failed)?;
-    let file = {
+    let unfinished = {
         let mut partial = partial();
-        let file = File::create(&partial_path).with_context(failed)?;
-        partial.push(partial_path.clone());
-        file
+        let unfinished = beside(path).and_then(|(builder, folder)| Ok(builder.tempfile_in(folder)?));
+        let unfinished = unfinished.with_context(failed)?;
+        partial.push(unfinished.path().to_owned());
+        unfinished
     };
+    let (file, unfinished) = unfinished.into_parts();
     let mut out = BufWriter::new(file);
     let written = write(&mut out).and_then(|done| {
         out.flush()?;
@@ -148,29 +173,26 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
     });
     drop(out);
     let mut partial = partial();
-    partial.retain(|path| *path != partial_path);
+    partial.retain(|path| *path != *unfinished);
     let placed = written.and_then(|done| {
-        fs::rename(&partial_path, path)?;
+        unfinished.persist(path)?;
         Ok(done)
     });
-    if placed.is_err() {
-        let _ = fs::remove_file(&partial_path);
-    }
     placed.with_context(failed)
 }
 
 /// Works in a folder beside the place of an output; it is gone afterwards, also if the work fails.
 pub fn in_folder_beside<T>(path: &Path, work: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
-    let folder = partial_path(path)?.with_extension("parts");
-    {
+    let folder = {
         let mut partial = partial();
-        fs::create_dir(&folder).with_context(|| format!("{} could not be made", folder.display()))?;
-        partial.push(folder.clone());
-    }
-    let done = work(&folder);
+        let folder = beside(path).and_then(|(builder, folder)| Ok(builder.tempdir_in(folder)?));
+        let folder = folder.with_context(|| format!("no folder beside {} could be made", path.display()))?;
+        partial.push(folder.path().to_owned());
+        folder
+    };
+    let done = work(folder.path());
     let mut partial = partial();
-    partial.retain(|path| *path != folder);
-    let _ = fs::remove_dir_all(&folder);
+    partial.retain(|path| path != folder.path());
     done
 }
 
@@ -238,13 +260,16 @@ pub fn write_seekable(path: &Path, write: impl FnOnce(&mut dyn WriteSeek) -> Res
     })
 }
 
-/// Where the output grows: beside its place, so that it can be moved there at once.
-fn partial_path(path: &Path) -> Result<PathBuf> {
-    let name = path.file_name().context("this is no name for a file; give one after -o")?;
-    let mut partial = std::ffi::OsString::from(".");
-    partial.push(name);
-    partial.push(format!(".{}.partial", std::process::id()));
-    Ok(path.with_file_name(partial))
+/// Where the output grows: beside its place, so that it can be moved there at once, under a hidden name that nobody else can know before.
+fn beside(path: &Path) -> Result<(tempfile::Builder<'static, 'static>, &Path)> {
+    ensure!(path.file_name().is_some(), "this is no name for a file; give one after -o");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".tetralod-").suffix(".partial");
+    // As other files are: readable by others as far as the user lets them.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    Ok((builder, folder.unwrap_or(Path::new("."))))
 }
 
 /// An MT file: all of it, or what was needed.

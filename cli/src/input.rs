@@ -1,6 +1,7 @@
 //! Meshes from files: time steps put together, mended, fields at cells turned into fields at points.
 
 use super::files::{self, Opened};
+use super::output;
 use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -81,13 +82,14 @@ pub fn read_cells(
         }
     })?;
     drop(input);
+    files::note_inputs(&mesh.input.files.0);
     say_notes(&mesh, &steps[0].path);
     mend(mesh, level, &steps[0].path)
 }
 
 /// Says what the reader left out of a file.
 fn say_notes(mesh: &TetMesh, path: &Path) {
-    mesh.notes.iter().for_each(|note| eprintln!("note: {}: {note}", name(path)));
+    mesh.notes.iter().for_each(|note| output::note(&format!("note: {}: {note}", name(path))));
 }
 
 /// The time steps in these files.

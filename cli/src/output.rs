@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::io;
 use std::io::Write;
 
@@ -44,11 +45,32 @@ fn table<N: AsRef<str>>(rows: &[(N, String)]) -> Result<()> {
 
 /// Prints a text and a line end.
 pub fn print(text: &str) -> Result<()> {
-    match writeln!(io::stdout(), "{text}") {
+    match writeln!(io::stdout(), "{}", printable(text)) {
         // Whoever reads has seen enough.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         done => done.context("stdout could not be written"),
     }
+}
+
+/// Tells people something beside the result, on stderr.
+pub fn note(text: &str) {
+    eprintln!("{}", printable(text));
+}
+
+/// A text in which characters that do something to a terminal, or to the order in which others are shown, are written as in JSON: names
+/// come from files of others.
+fn printable(text: &str) -> Cow<'_, str> {
+    let acts = |c: char| {
+        c.is_control() && c != '\n' || matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(acts) {
+        return text.into();
+    }
+    text.chars()
+        .fold(String::new(), |out, c| {
+            if acts(c) { out + &format!("\\u{:04x}", u32::from(c)) } else { out + c.encode_utf8(&mut [0; 4]) }
+        })
+        .into()
 }
 
 /// A count in groups of three digits: `1 234 567`.
@@ -138,5 +160,17 @@ mod tests {
         assert_eq!([0_u32, 999, 1000, 1_234_567].map(count), ["0", "999", "1 000", "1 234 567"]);
         assert_eq!([0, 1023, 1536].map(bytes), ["0 bytes", "1023 bytes", "1.5 KiB (1 536 bytes)"]);
         assert_eq!(percent(0.001), "0.1000 %");
+    }
+
+    #[test]
+    fn nothing_acts_on_the_terminal() {
+        assert_eq!(printable("a\nä = 1"), "a\nä = 1");
+        assert_eq!(
+            printable("\u{1b}[2J\r\u{9b}m\u{202e}x\u{7f}"),
+            "\\u001b[2J\\u000d\\u009bm\\u202ex\\u007f"
+        );
+        let json = serde_json::to_string("\u{9b}\u{1b}\u{2066}").expect("JSON");
+        let read: String = serde_json::from_str(&printable(&json)).expect("still JSON");
+        assert_eq!(read, "\u{9b}\u{1b}\u{2066}");
     }
 }

@@ -122,9 +122,10 @@ impl Query {
         self.answer_with(|client| match client.fetch_exact() {
             Err(ClientError::Format(FormatError::Truncated { .. })) => {
                 let file = self.file.display();
-                eprintln!(
-                    "warning: {file}: the exact values that the file keeps are cut off; the values are those of the lattices, as                      `tetralod info` bounds them"
-                );
+                output::note(&format!(
+                    "warning: {file}: the exact values that the file keeps are cut off; the values are those of the lattices, as \
+                     `tetralod info` bounds them"
+                ));
                 Ok(())
             }
             fetched => Ok(fetched?),
@@ -152,7 +153,7 @@ impl Query {
         let seconds = start.elapsed().as_secs_f64();
         opened.session.set_field(field)?;
         let warnings = needs.iter().filter_map(|named| needs::warning(&opened.session, &stats, named));
-        warnings.for_each(|warning| eprintln!("warning: {warning}"));
+        warnings.for_each(|warning| output::note(&format!("warning: {warning}")));
         let summary = summary(&opened, field, &stats, &needs)?;
         Ok(Answer { opened, field, needs, stats, seconds, summary })
     }

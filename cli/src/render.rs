@@ -216,7 +216,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         field: &answer.opened.info()?.fields[answer.field],
     };
     let state = arguments.shown.state(&arguments.query, &about)?;
-    shown::warnings(&state, &about).iter().for_each(|warning| eprintln!("warning: {warning}"));
+    shown::warnings(&state, &about).iter().for_each(|warning| output::note(&format!("warning: {warning}")));
     let is_transparent = state.background == Background::Transparent;
     let camera = arguments.placed.camera(&about.bounds, f64::from(size[0]) / f64::from(size[1]));
     let mut scene = Scene::new(renderer);

@@ -30,6 +30,7 @@
 //! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
 //! volume are left out beside them. Readers check the file, not the mesh: see [`crate::mesh::repair`].
 
+mod beside;
 mod cell_shapes;
 mod cells;
 mod error;
@@ -69,8 +70,9 @@ pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{PointArray, point_arrays, write_vti, write_vtu};
 pub use write_layers::write_vti_layers;
 
-use std::path::{Component, Path};
+use std::path::Path;
 
+use crate::io::beside::FilesOf;
 use crate::io::error::At;
 use crate::mesh::{TetMesh, straighten};
 
@@ -148,14 +150,19 @@ fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErr
     if path.is_dir() {
         return Err(foreign::refused_folder(path)).at(String::new).map_err(|error| in_file(error, &name));
     }
-    match lower_extension(path).as_str() {
-        "json" => read_raw_by_sidecar(path, None),
-        "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
+    let files = FilesOf::new(path);
+    let mut mesh = match lower_extension(path).as_str() {
+        "json" => read_raw_by_sidecar(&files, path, None)?,
+        "raw" => read_raw_by_sidecar(&files, &path.with_extension("json"), Some(path))?,
         #[cfg(feature = "formats")]
-        "node" | "ele" => formats::tetgen::read(path, options),
-        _ => read_ranges(path, options)
-            .unwrap_or_else(|| read_in(&name, &load(path)?, options, &|file| load_beside(path, file))),
-    }
+        "node" | "ele" => formats::tetgen::read(&files, path, options)?,
+        _ => match read_ranges(path, options) {
+            Some(read) => read?,
+            None => read_in(&name, &files.load_one(path)?, options, &|file| files.load(file))?,
+        },
+    };
+    mesh.input.files.0 = files.into_read();
+    Ok(mesh)
 }
 
 /// Reads what is wanted of a file of a format that need not be read as a whole; none if it is another one.
@@ -242,15 +249,20 @@ pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, R
     mesh.at(String::new).map_err(|e| in_file(e, name))
 }
 
-fn read_raw_by_sidecar(sidecar_path: &Path, samples_path: Option<&Path>) -> Result<TetMesh, ReadError> {
+fn read_raw_by_sidecar(
+    files: &FilesOf<'_>,
+    sidecar_path: &Path,
+    samples_path: Option<&Path>,
+) -> Result<TetMesh, ReadError> {
     let name = sidecar_path.display().to_string();
-    let sidecar = raw::Sidecar::parse(&load(sidecar_path)?).at(String::new).map_err(|e| in_file(e, &name))?;
+    let sidecar =
+        raw::Sidecar::parse(&files.load_one(sidecar_path)?).at(String::new).map_err(|e| in_file(e, &name))?;
     let samples_path = match (samples_path, &sidecar.file) {
         (Some(path), _) => path.to_owned(),
         (None, Some(file)) => sidecar_path.with_file_name(file),
         (None, None) => sidecar_path.with_extension("raw"),
     };
-    let samples = load(&samples_path)?;
+    let samples = files.load_one(&samples_path)?;
     sidecar.mesh(&samples).at(String::new).map_err(|e| in_file(e, &samples_path.display().to_string()))
 }
 
@@ -361,19 +373,7 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
 }
 
 fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let bytes = std::fs::read(path).map_err(|e| ReadReason::Io(e.to_string()));
-    bytes.at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
-}
-
-/// Reads a file that another one refers to, which must lie in the folder of that or below.
-fn load_beside(path: &Path, file: &str) -> Result<Vec<u8>, ReadReason> {
-    let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
-    if file.is_empty() || !Path::new(file).components().all(below) {
-        let what = format!("a file in another folder (\"{file}\")");
-        let remedy = "put the files beside the one that refers to them, or below it".into();
-        return Err(ReadReason::Unsupported { what, remedy });
-    }
-    std::fs::read(path.with_file_name("").join(file)).map_err(|e| ReadReason::Io(format!("\"{file}\": {e}")))
+    FilesOf::new(path).load_one(path)
 }
 
 /// Names the file of an error that does not name another one.

@@ -6,13 +6,14 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use crate::io::beside::FilesOf;
 use crate::io::cells::Numbering;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::settle_unused;
 use crate::io::pvtu::{bits, for_each_file};
 use crate::io::vtu::{PieceReader, first_number};
 use crate::io::xml::Document;
-use crate::io::{ReadOptions, in_file, load, load_beside, packed, without_mark};
+use crate::io::{ReadOptions, in_file, load, packed, without_mark};
 use crate::mesh::{Field, MeshPiece, Middles, TetMesh};
 
 /// A mesh in several files, of which one is read at a time.
@@ -62,7 +63,8 @@ impl Pieces {
     pub fn counts(&self) -> Result<PieceCounts, ReadError> {
         let document = Document::parse(without_mark(&self.list)).map_err(|error| self.named(error))?;
         let mut counts = PieceCounts::default();
-        let beside = |file: &str| load_beside(&self.path, file);
+        let files = FilesOf::new(&self.path);
+        let beside = |file: &str| files.load(file);
         let counted = for_each_file(&document, &beside, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let points = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
@@ -111,7 +113,8 @@ impl Pieces {
         document: &Document<'_>,
         each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
     ) -> Result<(), ReadError> {
-        let beside = |file: &str| load_beside(&self.path, file);
+        let files = FilesOf::new(&self.path);
+        let beside = |file: &str| files.load(file);
         let mut hashes = Vec::new();
         let time = for_each_file(document, &beside, &mut |file| {
             self.each_reader(file, &mut |reader| {

@@ -12,7 +12,7 @@ use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::formats;
 use crate::io::write::escaped;
 use crate::io::xml::Attributes;
-use crate::io::{in_file, load, lower_extension, packed, without_gz};
+use crate::io::{beside, in_file, load, lower_extension, packed, without_gz};
 
 /// A file that holds one time step.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,9 +43,12 @@ pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
     let listed =
         load(path).and_then(|bytes| packed::unpacked(&bytes).and_then(|bytes| parse(&bytes)).at(String::new));
     let listed = listed.map_err(|error| in_file(error, &path.display().to_string()))?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let step = |(time, file): (Option<f64>, String)| Step { path: folder.join(file), time, number: 0 };
-    Ok(listed.into_iter().map(step).collect())
+    let step = |(time, file): (Option<f64>, String)| {
+        let path = beside::place(path, &file).at(String::new)?;
+        Ok(Step { path, time, number: 0 })
+    };
+    let steps: Result<_, ReadError> = listed.into_iter().map(step).collect();
+    steps.map_err(|error| in_file(error, &path.display().to_string()))
 }
 
 /// The times of the steps in a file that may have several.

@@ -144,6 +144,7 @@ fn append(
         let same = |field: &Field| options.fields.as_ref().is_some_and(|names| names.contains(&field.name));
         next.fields.retain(same);
         next.cell_fields.retain(same);
+        mesh.input.files.0.append(&mut next.input.files.0);
         mesh.add_step(next).map_err(|error| TimeStepsError::Step { file: file(), error })?;
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! What is known of the input that a mesh was read from: for messages in its own numbers, and for what was left out.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use crate::mesh::Field;
 #[cfg(feature = "build")]
@@ -17,9 +18,22 @@ pub struct MeshInput {
     pub other_fields: Vec<Field>,
     /// The same of fields at cells.
     pub other_cell_fields: Vec<Field>,
+    /// The files that it was read from.
+    pub files: SourceFiles,
     /// The middles of its cells, until the mesh is passed on.
     #[cfg(feature = "build")]
     pub(crate) middles: Middles,
+}
+
+/// The files that a mesh was read from: the one that was given, and those that it names. They are no part of what the mesh is: all are
+/// equal.
+#[derive(Clone, Debug, Default)]
+pub struct SourceFiles(pub Vec<PathBuf>);
+
+impl PartialEq for SourceFiles {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl MeshInput {
@@ -49,6 +63,7 @@ impl MeshInput {
     /// Takes over what is known of another part of the input, whose tetrahedra follow those of this one.
     pub fn append(&mut self, part: Self) {
         self.cells.append(part.cells);
+        self.files.0.extend(part.files.0);
         #[cfg(feature = "build")]
         self.middles.append(part.middles);
         for note in part.notes {

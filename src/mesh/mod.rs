@@ -37,7 +37,7 @@ pub(crate) use grow::growth_order;
 pub(crate) use grow::{Gate, Growth};
 pub use histogram::Histogram;
 pub(crate) use histogram::{Sum, volume_of};
-pub use input::{CellNumbers, InputCell, MeshInput, Note};
+pub use input::{CellNumbers, InputCell, MeshInput, Note, SourceFiles};
 pub use kuhn::kuhn_tets;
 pub use layered_grid::{GridArray, LayeredGrid};
 #[cfg(feature = "build")]

@@ -645,6 +645,54 @@ fn inputs_are_never_replaced() {
 }
 
 #[test]
+fn inputs_that_others_name_are_never_replaced() {
+    let folder = Folder::new("replaced-named");
+    let [input, mt, list, sub] = ["in.vti", "m.mt", "list.pvd", "sub"].map(|name| folder.path(name));
+    bucky(7, &input, &mt);
+    fs::create_dir(sub).expect("a folder");
+    let [mesh, pieces] = ["sub/mesh.vtu", "sub/all.pvtu"].map(|name| folder.path(name));
+    good(&["extract", &mt, "-o", &mesh]);
+    let collection = |file: &str| {
+        format!(
+            "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"{file}\"/></Collection></VTKFile>"
+        )
+    };
+    let grid = |file: &str| {
+        let data = "<PPoints><PDataArray type=\"Float64\" NumberOfComponents=\"3\"/></PPoints><PPointData>\
+                    <PDataArray type=\"Float64\" Name=\"density\"/></PPointData>";
+        let pieces = format!(
+            "<PUnstructuredGrid GhostLevel=\"0\">{data}<Piece Source=\"{file}\"/></PUnstructuredGrid>"
+        );
+        format!("<VTKFile type=\"PUnstructuredGrid\">{pieces}</VTKFile>")
+    };
+    let before = fs::read(&mesh).expect("a file");
+    // By a list in a list, and under a name that only XML makes the same.
+    for (listed, piece) in
+        [("sub/all.pvtu", "mesh.vtu"), ("sub/all.pvtu", "&#109;esh.vtu"), ("sub/&#109;esh.vtu", "mesh.vtu")]
+    {
+        fs::write(&list, collection(listed)).expect("a file");
+        fs::write(&pieces, grid(piece)).expect("a file");
+        for arguments in [
+            &["extract", &mt, "-o", &mesh, "--error", "5%", "--measure", &list][..],
+            &["extract", &mt, "-o", &mesh, "--fit", &list],
+        ] {
+            bad(1, arguments, &["is an input, too", "another file"]);
+        }
+        assert_eq!(fs::read(&mesh).expect("a file"), before);
+    }
+    // Samples of a header that lies beside them.
+    let [header, samples] = ["a.nhdr", "a.mt"].map(|name| folder.path(name));
+    fs::write(&samples, [7; 64]).expect("a file");
+    fs::write(
+        &header,
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: raw\ndata file: LIST\n./a.mt\n",
+    )
+    .expect("a file");
+    bad(1, &["build", &header, "-o", &samples], &["is an input, too", "another file"]);
+    assert_eq!(fs::read(&samples).expect("a file"), [7; 64]);
+}
+
+#[test]
 fn outputs_have_names_and_places() {
     let folder = Folder::new("places");
     let [input, mt, none, other] = ["in.vti", "m.mt", "none/m.mt", "sub"].map(|name| folder.path(name));

@@ -5,19 +5,24 @@
 
 use std::path::Path;
 
+use crate::io::beside::FilesOf;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::component_of;
 use crate::io::formats::draft::Draft;
 use crate::io::formats::medit_cells;
 use crate::io::formats::scanner::{Scanner, parsed};
-use crate::io::{ReadOptions, cells, in_file, load};
+use crate::io::{ReadOptions, cells, in_file};
 use crate::mesh::TetMesh;
 
 /// Reads the two files of which `path` is one.
-pub(in crate::io) fn read(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+pub(in crate::io) fn read(
+    files: &FilesOf<'_>,
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<TetMesh, ReadError> {
     let [nodes, cells] = ["node", "ele"].map(|ending| path.with_extension(ending));
     let name = |path: &Path| path.display().to_string();
-    let (node_bytes, cell_bytes) = (load(&nodes)?, load(&cells)?);
+    let (node_bytes, cell_bytes) = (files.load_one(&nodes)?, files.load_one(&cells)?);
     let mut draft = Draft::new(options);
     let mut file = Scanner::with_comments(&node_bytes);
     let first = read_nodes(&mut file, &mut draft);
