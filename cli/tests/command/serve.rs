@@ -11,9 +11,15 @@ use tetralod::stream::{HttpOptions, HttpSource, RangeSource, StreamError, Wanted
 const DIGITS: &str = "0123456789";
 
 fn ask(server: &Server, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
+    ask_as("localhost", server, method, path, headers)
+}
+
+/// Asks for something by this name of the server.
+fn ask_as(host: &str, server: &Server, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
     let mut stream = TcpStream::connect(server.address().0).expect("it listens");
     let headers: String = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
-    write!(stream, "{method} {path} HTTP/1.1\r\nHost: x\r\n{headers}Connection: close\r\n\r\n").unwrap();
+    let head = format!("{method} {path} HTTP/1.1\r\nHost: {host}\r\n{headers}Connection: close\r\n\r\n");
+    stream.write_all(head.as_bytes()).expect("it listens");
     let mut text = String::new();
     stream.read_to_string(&mut text).expect("an answer");
     let (head, body) = text.split_once("\r\n\r\n").expect("a head");
@@ -165,6 +171,86 @@ fn nothing_else_is_shown() {
 }
 
 #[test]
+fn hidden_files_are_not_served() {
+    let (folder, www) = folder("serve-hidden");
+    for hidden in ["www/.git", "www/sub/.cache"] {
+        fs::create_dir_all(folder.path(hidden)).expect("a folder");
+    }
+    for hidden in ["www/.git/config", "www/.env", "www/sub/.cache/secret.mt"] {
+        fs::write(folder.path(hidden), "secret").expect("a file");
+    }
+    let server = Server::start(&[&www, "--mount", &format!("/m={www}")]);
+    let paths =
+        ["/.git/config", "/%2egit/config", "/.env", "/%2Eenv", "/sub/.cache/secret.mt", "/sub/..%2f.env"];
+    for path in paths {
+        for path in [path.to_owned(), format!("/m{path}")] {
+            let answer = get(&server, &path, &[]);
+            assert_eq!((answer.status, answer.body.as_str()), (404, ""), "{path}");
+        }
+    }
+}
+
+#[test]
+fn no_address_leads_to_another_server() {
+    let (folder, www) = folder("serve-redirect");
+    fs::create_dir_all(folder.path("www/sub")).expect("a folder");
+    let server = Server::start(&[&www]);
+    assert_eq!(get(&server, "/sub", &[]).header("location"), Some("/sub/"));
+    for path in ["//sub", "///sub", "//example.org/..", "/%2Fsub", "/%2f/sub", "/\\sub", "/%5csub"] {
+        let answer = get(&server, path, &[]);
+        assert_eq!(answer.header("location"), None, "{path}: {}", answer.head);
+        assert!(matches!(answer.status, 400 | 404), "{path}: {}", answer.status);
+    }
+}
+
+#[test]
+fn what_is_for_this_machine_answers_to_its_names_alone() {
+    let (_folder, www) = folder("serve-names");
+    let ask = |server: &Server, host: &str| ask_as(host, server, "GET", "/digits.mt", &[]);
+    let server = Server::start(&[&www]);
+    let address = server.address().0;
+    for name in [address, "localhost", "LOCALHOST:1", "volumes.localhost", "127.0.0.2:80", "[::1]:8080"] {
+        assert_eq!(ask(&server, name).body, DIGITS, "{name}");
+    }
+    for name in
+        ["example.org", "example.org:8080", "localhost.example.org", "192.168.0.1", "0.0.0.0", "", "a b"]
+    {
+        let answer = ask(&server, name);
+        assert!(matches!(answer.status, 400 | 421), "{name}: {}", answer.status);
+        assert!(!answer.body.contains(DIGITS), "{name}");
+    }
+    let mut server = Server::start(&[&www, "--host", "0.0.0.0"]);
+    server.url = server.url.replace("0.0.0.0", "127.0.0.1");
+    assert_eq!(ask(&server, "example.org").body, DIGITS);
+}
+
+#[test]
+fn pages_of_other_origins_may_read_mt_files_alone_unless_more_is_asked_for() {
+    let (folder, www) = folder("serve-shared");
+    fs::write(folder.path("www/notes.txt"), "notes").expect("a file");
+    let page = [("Origin", "https://example.org"), ("Access-Control-Request-Method", "GET")];
+    let allowed = |server: &Server, path: &str| {
+        let [answer, preflight] = ["GET", "OPTIONS"].map(|method| ask(server, method, path, &page));
+        let policy = answer.header("cross-origin-resource-policy").map(str::to_owned);
+        let [a, b] = [&answer, &preflight]
+            .map(|answer| answer.header("access-control-allow-origin").map(str::to_owned));
+        assert_eq!(a, b, "{path}");
+        (a.as_deref() == Some("*"), policy.as_deref() == Some("cross-origin"))
+    };
+    let server = Server::start(&[&www]);
+    assert_eq!(allowed(&server, "/digits.mt"), (true, true));
+    for path in ["/", "/notes.txt", "/none", "/index.html"] {
+        assert_eq!(allowed(&server, path), (false, false), "{path}");
+    }
+    let server = Server::start(&[&www, "--cors", "*"]);
+    assert_eq!(allowed(&server, "/notes.txt"), (true, true));
+    let server = Server::start(&[&folder.path("www/notes.txt")]);
+    assert_eq!(allowed(&server, "/notes.txt"), (true, true), "the one file that was named");
+    let server = Server::start(&[&www, "--cors", "none"]);
+    assert_eq!(allowed(&server, "/digits.mt"), (false, false));
+}
+
+#[test]
 fn other_origins_and_caches_are_told_what_was_chosen() {
     let (_folder, www) = folder("serve-cors");
     let page = ("Origin", "https://example.org");
@@ -208,12 +294,23 @@ fn pages_and_their_modules_have_the_types_that_browsers_ask_for() {
 
 #[test]
 fn connections_that_wait_do_not_keep_others_waiting() {
-    let (_folder, www) = folder("serve-idle");
+    let (folder, www) = folder("serve-idle");
+    fs::write(folder.path("www/large.mt"), vec![1; 4 << 20]).expect("a file");
     let server = Server::start(&[&www]);
-    let connect = |_| TcpStream::connect(server.address().0).expect("it listens");
-    let idle: Vec<TcpStream> = (0..40).map(connect).collect();
+    // Some say nothing, some stop in the middle of a request, some take nothing of what they asked for, one is open between two requests:
+    // more of them than there may be.
+    let begun =
+        ["", "GET /digits.mt HTTP/1.1\r\nHost: local", "GET /large.mt HTTP/1.1\r\nHost: localhost\r\n\r\n"];
+    let connect = |i: usize| {
+        let mut stream = TcpStream::connect(server.address().0).expect("it listens");
+        stream
+            .write_all(begun[usize::from(i % 8 != 0) + usize::from(i % 40 == 1)].as_bytes())
+            .expect("it listens");
+        stream
+    };
+    let waiting: Vec<TcpStream> = (0..450).map(connect).collect();
     assert_eq!(get(&server, "/digits.mt", &[]).body, DIGITS);
-    drop(idle);
+    drop(waiting);
 }
 
 #[test]

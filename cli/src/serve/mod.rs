@@ -4,10 +4,13 @@
 //! Range, CORS with the headers that scripts have to see, and entity tags. Any good host does the same; this one is for
 //! the own machine and for data that does not leave the house.
 
+mod connections;
+
 use anyhow::{Context, Result, bail};
 use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
+use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::Response;
@@ -15,16 +18,13 @@ use futures_util::StreamExt;
 use futures_util::stream::unfold;
 use percent_encoding::percent_decode_str;
 use std::io::Write;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use tower_http::cors::{AllowOrigin, CorsLayer};
 use tower_http::services::{ServeDir, ServeFile};
-
-/// How long downloads under way may take to end after Ctrl-C.
-const GRACE: Duration = Duration::from_secs(5);
 
 /// What scripts of other origins must be able to read of an answer.
 const EXPOSED: [HeaderName; 7] = [
@@ -40,24 +40,32 @@ const EXPOSED: [HeaderName; 7] = [
 /// What they may send.
 const ACCEPTED: [HeaderName; 4] = [header::IF_MATCH, header::IF_NONE_MATCH, header::IF_RANGE, header::RANGE];
 
+/// What lets pages of other origins read an answer.
+const CORS: [HeaderName; 2] = [header::ACCESS_CONTROL_ALLOW_ORIGIN, header::ACCESS_CONTROL_EXPOSE_HEADERS];
+
+/// What pages that are served may do: nothing that a page with volumes needs is among what is forbidden.
+const POLICY: &str = "base-uri 'self'; form-action 'self'; object-src 'none'";
+
 /// Serves MT files to pages and programs: byte ranges, entity tags, CORS.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The folder to serve, or the one file. Links that lead out of a folder are not followed.
+    /// The folder to serve, or the one file. Files whose names, or whose folders' names, begin with a dot are not served, and links that
+    /// lead out of a folder not followed.
     #[arg(default_value = ".", value_name = "DIR|FILE")]
     path: PathBuf,
     /// The port to listen on; 0 takes any that is free.
     #[arg(long, default_value_t = 8080)]
     port: u16,
-    /// The address to listen on; 0.0.0.0 lets other machines in.
+    /// The address to listen on; 0.0.0.0 lets other machines in. On the own machine only requests for localhost are answered.
     #[arg(long, default_value = "127.0.0.1")]
     host: String,
     /// How long a copy may be used unasked; with 0 browsers ask each time whether theirs still holds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0)]
     cache: u32,
-    /// The origin whose pages may read the files, * for any, none for those of this server alone.
-    #[arg(long, value_name = "ORIGIN", default_value = "*")]
-    cors: String,
+    /// The origin whose pages may read the files, * for any, none for those of this server alone. Without it pages of any origin may read
+    /// MT files (.mt), and nothing else.
+    #[arg(long, value_name = "ORIGIN")]
+    cors: Option<String>,
     /// Serve another folder below an address (repeatable): --mount /pkg=node_modules/tetralod.
     #[arg(long = "mount", value_name = "/NAME=DIR", value_parser = parse_mount)]
     mounts: Vec<(String, PathBuf)>,
@@ -82,8 +90,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let listener = TcpListener::bind((host.as_str(), *port)).await.with_context(|| {
             format!("{host}:{port} cannot be listened on; choose another --port, or 0 for any that is free")
         })?;
-        announce(listener.local_addr()?, &path)?;
-        listen(listener, router, stop).await
+        let address = listener.local_addr()?;
+        let names = Names::of(host, address.ip());
+        let router = router.layer(middleware::from_fn(move |request: Request, next: Next| {
+            let known = names.include(&request);
+            async move { if known { next.run(request).await } else { misdirected() } }
+        }));
+        announce(address, &path)?;
+        connections::serve(listener, router, stop).await;
+        Ok(())
     });
     // A file that is being read from a slow disk does not hold up the end.
     runtime.shutdown_background();
@@ -107,11 +122,11 @@ fn folder(at: &str, path: &Path) -> Result<Router> {
     let root = path.canonicalize().with_context(|| path.display().to_string())?;
     let files = ServeDir::new(&root).redirect_path_prefix(at);
     let guard = middleware::from_fn(move |request: Request, next: Next| {
-        let file =
-            root.join(&*percent_decode_str(request.uri().path().trim_start_matches('/')).decode_utf8_lossy());
+        let path = percent_decode_str(request.uri().path()).decode_utf8_lossy().into_owned();
+        let file = root.join(path.trim_start_matches('/'));
         let root = root.clone();
         async move {
-            if leads_out(&root, file).await {
+            if is_hidden(&path) || leads_out(&root, file).await {
                 with_status(StatusCode::NOT_FOUND)
             } else {
                 next.run(request).await
@@ -119,6 +134,11 @@ fn folder(at: &str, path: &Path) -> Result<Router> {
         }
     });
     Ok(Router::new().fallback_service(files).layer(guard))
+}
+
+/// Whether a path has a part that begins with a dot, or an empty one: a redirect to `//name/` would lead to another server.
+fn is_hidden(path: &str) -> bool {
+    path.contains("//") || path.split(['/', '\\']).any(|part| part.starts_with('.'))
 }
 
 /// Whether a file that is there lies outside of the folder `root`: a link may lead there.
@@ -166,17 +186,77 @@ fn with_headers(router: Router, arguments: &Arguments) -> Result<Router> {
         0 => HeaderValue::from_static("no-cache"),
         seconds => HeaderValue::try_from(format!("public, max-age={seconds}"))?,
     };
-    let shared = arguments.cors != "none";
     let router = router.layer(middleware::from_fn(ranges)).layer(middleware::from_fn(throttle));
-    let router = router.layer(middleware::from_fn(move |request: Request, next: Next| {
-        let caching = caching.clone();
+    let router = match arguments.cors.as_deref() {
+        Some("none") => router,
+        chosen => router.layer(cors(chosen.unwrap_or("*"))?),
+    };
+    // The one file is meant to be read, whatever its name.
+    let shared = match arguments.cors.as_deref() {
+        Some("none") => Shared::Nothing,
+        None if arguments.path.is_dir() => Shared::MtFiles,
+        _ => Shared::All,
+    };
+    Ok(router.layer(middleware::from_fn(move |request: Request, next: Next| {
+        let (caching, shared) = (caching.clone(), shared.has(request.uri().path()));
         async move {
             let mut response = next.run(request).await;
             label(&mut response, caching, shared);
             response
         }
-    }));
-    Ok(if shared { router.layer(cors(&arguments.cors)?) } else { router })
+    })))
+}
+
+/// What pages of other origins may read.
+#[derive(Clone, Copy)]
+enum Shared {
+    Nothing,
+    MtFiles,
+    All,
+}
+
+impl Shared {
+    fn has(self, path: &str) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::MtFiles => path.to_ascii_lowercase().ends_with(".mt"),
+            Self::All => true,
+        }
+    }
+}
+
+/// What a server is called by those who mean it. A page elsewhere can give its own name the address of this machine, to read what is served
+/// here as if it were its own (DNS rebinding): what is for this machine alone answers to its names alone.
+#[derive(Clone)]
+enum Names {
+    Any,
+    Local(String),
+}
+
+impl Names {
+    /// The names of what listens to `address`, which the user called `host`.
+    fn of(host: &str, address: IpAddr) -> Self {
+        if address.is_loopback() { Self::Local(host.to_ascii_lowercase()) } else { Self::Any }
+    }
+
+    fn include(&self, request: &Request) -> bool {
+        let Self::Local(own) = self else { return true };
+        // Programs from before there was the header ask for nobody in particular.
+        let Some(named) = request.headers().get(header::HOST) else { return true };
+        let Some(authority) = named.to_str().ok().and_then(|text| text.parse::<Authority>().ok()) else {
+            return false;
+        };
+        let name = authority.host().trim_matches(['[', ']']).to_ascii_lowercase();
+        let is_loopback = name.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
+        is_loopback || name == *own || name == "localhost" || name.ends_with(".localhost")
+    }
+}
+
+fn misdirected() -> Response {
+    let mut response =
+        Response::new(Body::from("this server answers to localhost; `--host` opens it to others\n"));
+    *response.status_mut() = StatusCode::MISDIRECTED_REQUEST;
+    response
 }
 
 /// Puts the headers on an answer that do not depend on the file.
@@ -186,10 +266,15 @@ fn label(response: &mut Response, caching: HeaderValue, shared: bool) {
     // A file that is missing now may be there in a moment.
     headers.insert(header::CACHE_CONTROL, if good { caching } else { HeaderValue::from_static("no-store") });
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
-    if shared {
-        // For pages that are isolated to use threads.
-        let name = HeaderName::from_static("cross-origin-resource-policy");
-        headers.insert(name, HeaderValue::from_static("cross-origin"));
+    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
+    // For pages that are isolated to use threads.
+    let policy = if shared { "cross-origin" } else { "same-origin" };
+    let name = HeaderName::from_static("cross-origin-resource-policy");
+    headers.insert(name, HeaderValue::from_static(policy));
+    if !shared {
+        for name in CORS {
+            headers.remove(name);
+        }
     }
 }
 
@@ -304,21 +389,4 @@ fn announce(address: SocketAddr, path: &str) -> Result<()> {
     out.flush()?;
     eprintln!("Ctrl-C ends it");
     Ok(())
-}
-
-async fn listen(listener: TcpListener, router: Router, stop: watch::Receiver<bool>) -> Result<()> {
-    let mut overdue = stop.clone();
-    let server = axum::serve(listener, router).with_graceful_shutdown(stopped(stop));
-    let patience = async {
-        let _ = overdue.wait_for(|stop| *stop).await;
-        tokio::time::sleep(GRACE).await;
-    };
-    tokio::select! {
-        served = server => Ok(served?),
-        () = patience => Ok(()),
-    }
-}
-
-async fn stopped(mut stop: watch::Receiver<bool>) {
-    let _ = stop.wait_for(|stop| *stop).await;
 }
