@@ -31,13 +31,21 @@ const CAMERA_DIGITS = 9;
 const numbers = (words) => words.split(",").map(Number);
 const isNumbers = (words, count) => numbers(words).length === count && numbers(words).every(Number.isFinite);
 
+/** Whether words are a box: its corner of the least numbers, and that of the largest ones. */
+const isBox = (words) => isNumbers(words, 6) && [0, 1, 2].every((i) => numbers(words)[i] <= numbers(words)[i + 3]);
+
 /** A control whose default is what it has in the page as it was loaded. @returns {Entry} */
 function control(id) {
   const element = $(id);
   const isBox = element.type === "checkbox";
   const read = () => (isBox ? String(Number(element.checked)) : element.value);
   const initial = read();
-  const set = (words) => (isBox ? (element.checked = words === "1") : (element.value = words));
+  const put = (words) => (isBox ? (element.checked = words === "1") : (element.value = words));
+  const set = (words) => {
+    put(words);
+    // What it does not take would leave it empty, or at another value.
+    if (read() !== words) put(initial);
+  };
   return { get: () => (read() === initial ? "" : read()), set: (words) => set(words || initial) };
 }
 
@@ -69,11 +77,15 @@ function errorPosition(kind) {
   };
 }
 
+/** Controls whose values are known before a volume is. */
+const CONTROLS = [
+  ...["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"],
+  ...["axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"],
+];
+
 /** @returns {Record<string, Entry>} */
 function makeEntries() {
-  const ids = ["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
-  const more = ["time", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"];
-  const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
+  const simple = Object.fromEntries([...CONTROLS, "time"].map((id) => [id, control(id)]));
   return {
     view: radios("mode"),
     also: ofParts.also,
@@ -93,7 +105,7 @@ function makeEntries() {
     outside: errorPosition("view"),
     box: {
       get: () => (String(page.box) === String(inner(demo.info.bounds)) ? "" : String(page.box)),
-      set: (words) => (page.box = isNumbers(words, 6) ? numbers(words) : inner(demo.info.bounds)),
+      set: (words) => (page.box = isBox(words) ? numbers(words) : inner(demo.info.bounds)),
     },
     range: { get: () => page.colours.words, set: (words) => (page.colours.words = words) },
     transfer: { get: () => page.transfer.words, set: (words) => (page.transfer.words = words) },
@@ -234,13 +246,41 @@ function untaken(words) {
   return [...lost, ...off.map((name) => `${label("also", name)} beside the view`)];
 }
 
+/** What of some words means nothing, whatever the volume: names that are none, and values that their control does not have. @param {Words} words */
+function senseless(words) {
+  const tests = {
+    isovalue: (value) => isNumbers(value, 1),
+    range: (value) => isNumbers(value, 2),
+    box: isBox,
+    view: (value) => document.querySelector(`[name=mode][value="${CSS.escape(value)}"]`),
+    refine: (value) => document.querySelector(`[name=refine-by][value="${CSS.escape(value)}"]`),
+    camera: (value) => numbers(value.replace(/,orthographic$/, "")).length === 6,
+  };
+  const makesSense = (name, value) => {
+    if (name === "url") return true;
+    if (!entries[name]) return false;
+    if (tests[name]) return tests[name](value);
+    if (!CONTROLS.includes(name)) return true;
+    return $(name).type === "checkbox" ? ["0", "1"].includes(value) : $(name).value === value;
+  };
+  return Object.entries(words).filter(([name, value]) => value !== "" && !makesSense(name, value)).map(([name, value]) => `${name}=${value}`);
+}
+
+/** Says what is left out of some words. @param {string[]} lost @param {Words} words */
+function tell(lost, words) {
+  const ignored = senseless(words);
+  const said = lost.length > 0 ? [`Left out, since this volume does not have it: ${lost.join(", ")}`] : [];
+  if (ignored.length > 0) said.push(`Ignored in the address, for it means nothing: ${ignored.join(", ")}`);
+  if (said.length > 0) note(said.join(". "));
+}
+
 /** A volume has arrived: shows it with these words, or as it is by default; says what of them it does not have. @param {Words} words */
 export function arriveWith(words) {
   home = page.viewer.state.camera;
   const [kept, lost] = fitting(words);
   show(kept);
   lost.push(...untaken(words));
-  if (lost.length > 0) note(`Left out, since this volume does not have it: ${lost.join(", ")}`);
+  tell(lost, words);
   // What is changed first can be undone, too, however soon.
   if (now === undefined) save();
   // The address names the volume even if all events of its camera came before it was open.
@@ -266,8 +306,9 @@ function show(words) {
 /** Shows a state: opens its volume if that is another one. @param {Words} words */
 export function restore(words) {
   const { url = "" } = words;
-  if (url !== sourceWords() || !demo.info) open(url, words);
-  else show(words);
+  if (url !== sourceWords() || !demo.info) return open(url, words);
+  show(words);
+  tell([], words);
 }
 
 /** States before this one, and those that were undone. */
