@@ -54,15 +54,17 @@ const LONG: Duration = Duration::from_secs(10);
 /// Percent between two lines of progress.
 const PRINT_EVERY: u64 = 10;
 /// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: current meshes, a list of all tetrahedra of the
-/// MT (155 for kind half-edge, 310 for edge), and what requests are answered with.
-const TET_BYTES: u64 = 520;
+/// MT, what is remembered of each, and what requests are answered with. Updates of kind edge insert more tetrahedra.
+const TET_BYTES: u64 = 560;
+const EDGE_TET_BYTES: u64 = 800;
 const VERTEX_BYTES: u64 = 240;
 
 /// About the most memory that a verification takes.
 fn memory(mt: &Mt, input: &TetMesh) -> u64 {
     let [vertices, tets] = [input.positions.len() as u64, u64::from(mt.info().tetrahedra)];
     let fields = (input.fields.len() + 3) as u64;
-    mt.bytes() + (16 + TET_BYTES) * tets + (VERTEX_BYTES + 8 * fields) * vertices
+    let of_tet = if matches!(mt, Mt::Edge(_)) { EDGE_TET_BYTES } else { TET_BYTES };
+    mt.bytes() + (16 + of_tet) * tets + (VERTEX_BYTES + 8 * fields) * vertices
 }
 
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
