@@ -284,7 +284,7 @@ impl Look<'_> {
         let mut places = None;
         self.of.points.near_tet(&corners, |point| {
             let (position, place) = (self.of.points.points()[point as usize], self.of.places[point as usize]);
-            if point as usize % self.of.stride != 0 || is_corner(point, position) {
+            if !(point as usize).is_multiple_of(self.of.stride) || is_corner(point, position) {
                 return;
             }
             let places = places.get_or_insert_with(|| TetPlaces::new(corners));
