@@ -25,7 +25,7 @@ const LIMITS = {
   "./build": 4_000,
   "./inline": 400_000,
   "./worker": 10_800,
-  "./viewer-worker": 19_500,
+  "./viewer-worker": 19_600,
   "./build-worker": 5_500,
   "./core.wasm": 170_000,
   "./all-kinds.wasm": 242_000,
