@@ -861,7 +861,7 @@ fn an_interrupt_leaves_what_was_there() {
     let code = interrupt(&["generate", "bucky", "--size", "200", "-o", &folder.path("big.vti")], writing);
     assert_eq!(code, Some(130));
     // Nor are there some of the time steps.
-    let begun = || folder.names().iter().any(|name| name.starts_with(".new") || name == "v-0.vti");
+    let begun = || folder.names().iter().any(|name| name.starts_with(".tetralod-") || name == "v-0.vti");
     let steps = folder.path("v.pvd");
     let code = interrupt(&["generate", "abc-flow", "--size", "99", "--steps", "9", "-o", &steps], begun);
     assert_eq!(code, Some(130));
