@@ -454,7 +454,7 @@ fn headers_of_the_caller_go_to_no_other_origin() {
 fn another_origin_that_refuses_without_the_headers_is_asked_by_way_of_the_given_one() {
     let [here, there] = through_another_origin(true);
     // Those that were asked for at the same time as the first one that is refused.
-    assert!(there.requests() <= here.requests() + options().loader.max_requests as usize);
+    assert!(there.requests() <= here.requests() + options().loader.max_requests);
 }
 
 #[test]
