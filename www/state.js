@@ -26,7 +26,7 @@ const MOST = 200;
 const CAMERA_DIGITS = 9;
 
 /** @typedef {Record<string, string>} Words */
-/** @typedef {{ get: () => string, set: (words: string) => void }} Entry */
+/** `set` gives false for words that mean nothing, whatever the volume. @typedef {{ get: () => string, set: (words: string) => unknown }} Entry */
 
 const numbers = (words) => words.split(",").map(Number);
 const isNumbers = (words, count) => numbers(words).length === count && numbers(words).every(Number.isFinite);
@@ -43,8 +43,10 @@ function control(id) {
   const put = (words) => (isBox ? (element.checked = words === "1") : (element.value = words));
   const set = (words) => {
     put(words);
+    if (read() === words) return true;
     // What it does not take would leave it empty, or at another value.
-    if (read() !== words) put(initial);
+    put(initial);
+    return false;
   };
   return { get: () => (read() === initial ? "" : read()), set: (words) => set(words || initial) };
 }
@@ -62,8 +64,10 @@ function list(id) {
 function radios(name) {
   const initial = checked(name);
   const set = (words) => {
-    const wanted = all(`[name=${name}]`).find(({ value, disabled }) => value === words && !disabled);
-    (wanted ?? all(`[name=${name}]`).find(({ value }) => value === initial)).checked = true;
+    const named = (choice) => all(`[name=${name}]`).find(({ value }) => value === choice);
+    const wanted = named(words || initial);
+    (wanted && !wanted.disabled ? wanted : named(initial)).checked = true;
+    return Boolean(wanted);
   };
   return { get: () => (checked(name) === initial ? "" : checked(name)), set };
 }
@@ -77,15 +81,12 @@ function errorPosition(kind) {
   };
 }
 
-/** Controls whose values are known before a volume is. */
-const CONTROLS = [
-  ...["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"],
-  ...["axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"],
-];
-
 /** @returns {Record<string, Entry>} */
 function makeEntries() {
-  const simple = Object.fromEntries([...CONTROLS, "time"].map((id) => [id, control(id)]));
+  const ids = ["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
+  const more = ["axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"];
+  const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
+  const time = control("time");
   return {
     view: radios("mode"),
     also: ofParts.also,
@@ -96,18 +97,33 @@ function makeEntries() {
     vector: list("vector"),
     isovalue: {
       get: () => String(page.isovalue ?? ""),
-      set: (words) => (page.isovalue = words && isNumbers(words, 1) ? Number(words) : undefined),
+      set: (words) => {
+        const isOne = isNumbers(words, 1);
+        page.isovalue = words && isOne ? Number(words) : undefined;
+        return isOne;
+      },
     },
     ...ofPlanes,
     ...simple,
+    // Which times there are is up to the volume.
+    time: { get: time.get, set: (words) => void time.set(words) },
     refine: radios("refine-by"),
     error: errorPosition("field"),
     outside: errorPosition("view"),
     box: {
       get: () => (String(page.box) === String(inner(demo.info.bounds)) ? "" : String(page.box)),
-      set: (words) => (page.box = isBox(words) ? numbers(words) : inner(demo.info.bounds)),
+      set: (words) => {
+        page.box = isBox(words) ? numbers(words) : inner(demo.info.bounds);
+        return words === "" || isBox(words);
+      },
     },
-    range: { get: () => page.colours.words, set: (words) => (page.colours.words = words) },
+    range: {
+      get: () => page.colours.words,
+      set: (words) => {
+        page.colours.words = words;
+        return words === "" || page.colours.words !== "";
+      },
+    },
     transfer: { get: () => page.transfer.words, set: (words) => (page.transfer.words = words) },
     seeds: { get: () => page.flow.words, set: (words) => (page.flow.words = words) },
     probes: { get: () => page.probes.words, set: (words) => (page.probes.words = words) },
@@ -147,11 +163,13 @@ function setCamera(words) {
   /** @type {"orthographic" | "perspective"} */
   const projection = isOrthographic ? "orthographic" : "perspective";
   const camera = isWhole ? { target: /** @type {[number, number, number]} */ ([x, y, z]), distance, yaw, pitch, projection } : home;
-  if (!camera) return;
-  awaited = wordsOf(camera);
-  isSet = false;
-  const mine = awaited;
-  page.viewer.set({ camera }).then(() => (isSet ||= mine === awaited), fail);
+  if (camera) {
+    awaited = wordsOf(camera);
+    isSet = false;
+    const mine = awaited;
+    page.viewer.set({ camera }).then(() => (isSet ||= mine === awaited), fail);
+  }
+  return words === "" || isWhole;
 }
 
 function cameraMoved({ detail }) {
@@ -241,34 +259,13 @@ function untaken(words) {
   const label = (name, value) => document.querySelector(`[name=${name}][value="${value}"]`)?.parentElement.textContent.trim() ?? value;
   const lists = { field: "field", "surface-colour": "colours of", vector: "vector", time: "time step" };
   const lost = Object.entries(lists).flatMap(([id, what]) => (isNot(id) ? [`${what} ${words[id]}`] : []));
-  if (words.view && words.view !== checked("mode")) lost.push(`view ${label("mode", words.view)}`);
+  if (words.view !== checked("mode") && all("[name=mode]").some(({ value }) => value === words.view)) lost.push(`view ${label("mode", words.view)}`);
   const off = (words.also ?? "").split(",").filter((name) => document.querySelector(`[name=also][value="${CSS.escape(name)}"]:disabled`));
   return [...lost, ...off.map((name) => `${label("also", name)} beside the view`)];
 }
 
-/** What of some words means nothing, whatever the volume: names that are none, and values that their control does not have. @param {Words} words */
-function senseless(words) {
-  const tests = {
-    isovalue: (value) => isNumbers(value, 1),
-    range: (value) => isNumbers(value, 2),
-    box: isBox,
-    view: (value) => document.querySelector(`[name=mode][value="${CSS.escape(value)}"]`),
-    refine: (value) => document.querySelector(`[name=refine-by][value="${CSS.escape(value)}"]`),
-    camera: (value) => numbers(value.replace(/,orthographic$/, "")).length === 6,
-  };
-  const makesSense = (name, value) => {
-    if (name === "url") return true;
-    if (!entries[name]) return false;
-    if (tests[name]) return tests[name](value);
-    if (!CONTROLS.includes(name)) return true;
-    return $(name).type === "checkbox" ? ["0", "1"].includes(value) : $(name).value === value;
-  };
-  return Object.entries(words).filter(([name, value]) => value !== "" && !makesSense(name, value)).map(([name, value]) => `${name}=${value}`);
-}
-
-/** Says what is left out of some words. @param {string[]} lost @param {Words} words */
-function tell(lost, words) {
-  const ignored = senseless(words);
+/** Says what the volume does not have, and what means nothing. @param {string[]} lost @param {string[]} ignored */
+function tell(lost, ignored) {
   const said = lost.length > 0 ? [`Left out, since this volume does not have it: ${lost.join(", ")}`] : [];
   if (ignored.length > 0) said.push(`Ignored in the address, for it means nothing: ${ignored.join(", ")}`);
   if (said.length > 0) note(said.join(". "));
@@ -278,19 +275,20 @@ function tell(lost, words) {
 export function arriveWith(words) {
   home = page.viewer.state.camera;
   const [kept, lost] = fitting(words);
-  show(kept);
+  const ignored = show(kept);
   lost.push(...untaken(words));
-  tell(lost, words);
+  tell(lost, ignored);
   // What is changed first can be undone, too, however soon.
   if (now === undefined) save();
   // The address names the volume even if all events of its camera came before it was open.
   else changed();
 }
 
-/** Shows a state of the volume that is open. @param {Words} words */
+/** Shows a state of the volume that is open; gives what of it means nothing. @param {Words} words */
 function show(words) {
   const { transfer, ...others } = entries;
-  for (const [name, { set }] of Object.entries(others)) set(words[name] ?? "");
+  const ignored = Object.keys(words).filter((name) => name !== "url" && !entries[name]);
+  for (const [name, { set }] of Object.entries(others)) if (set(words[name] ?? "") === false) ignored.push(name);
   page.overlay.showsAxes = $("axes").checked;
   chooseField();
   // The step of a transfer function is at the isovalue of the field.
@@ -301,14 +299,14 @@ function show(words) {
   applyTheme();
   applyFrameTime();
   applyRefineBy();
+  return ignored.map((name) => `${name}=${words[name]}`);
 }
 
 /** Shows a state: opens its volume if that is another one. @param {Words} words */
 export function restore(words) {
   const { url = "" } = words;
   if (url !== sourceWords() || !demo.info) return open(url, words);
-  show(words);
-  tell([], words);
+  tell([], show(words));
 }
 
 /** States before this one, and those that were undone. */

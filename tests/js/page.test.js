@@ -698,9 +698,9 @@ test("what means nothing in the address is ignored, and said", async () => {
   const page = await open(SMALL, undefined, VIEWPORT);
   await reach(page, "complete");
   const before = await page.evaluate(() => ["background", "pixels", "map"].map((id) => /** @type {HTMLInputElement} */ (document.getElementById(id)).value));
-  await page.evaluate((url) => (location.hash = `#url=${url}&background=x&box=1,1,1,0,0,0&pixels=abc&map=none&nonsense=1&axes=7&camera=1,2&view=iso`), SMALL);
-  for (const word of ["background=x", "box=1,1,1,0,0,0", "pixels=abc", "map=none", "nonsense=1", "axes=7", "camera=1,2"]) await noted(page, new RegExp(`means nothing: .*${word}`));
-  assert.doesNotMatch(await page.innerText("#note"), /view=|url=/);
+  await page.evaluate((url) => (location.hash = `#url=${url}&background=x&box=1,1,1,0,0,0&pixels=abc&map=none&nonsense=1&axes=7&camera=1,2&view=iso&refine=none&range=symmetric`), SMALL);
+  for (const word of ["background=x", "box=1,1,1,0,0,0", "pixels=abc", "map=none", "nonsense=1", "axes=7", "camera=1,2", "refine=none"]) await noted(page, new RegExp(`means nothing: .*${word}`));
+  assert.doesNotMatch(await page.innerText("#note"), /view=|url=|range=/);
   await settle(page);
   assert.deepEqual(await page.evaluate(() => ["background", "pixels", "map"].map((id) => /** @type {HTMLInputElement} */ (document.getElementById(id)).value)), before);
   assert.deepEqual(page.complaints, []);
