@@ -485,6 +485,7 @@ impl BuildOptions {
         let options = ReadOptions { step: step.number, ..wanted.options() };
         let Some(pieces) = Pieces::open(&step.path, &options)? else { return Ok(None) };
         let prepare = |mesh: &mut TetMesh| {
+            files::note_inputs(&mesh.input.files.0);
             if step.time.is_some() {
                 mesh.fields.iter_mut().for_each(|field| field.time = step.time);
             }

@@ -48,14 +48,14 @@ pub fn remove_partial_output_on_interrupt() -> Result<()> {
     ctrlc::set_handler(interrupted).context("the handler for Ctrl-C could not be set")
 }
 
-/// The inputs that were read, at their places without links.
+/// The inputs that were given or read, at their places without links.
 static INPUTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn inputs() -> MutexGuard<'static, Vec<PathBuf>> {
     INPUTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Notes that these files were read: no output replaces them.
+/// Notes that these files are inputs: no output replaces them.
 pub fn note_inputs(files: &[PathBuf]) {
     inputs().extend(files.iter().filter_map(|file| fs::canonicalize(file).ok()));
 }
@@ -74,22 +74,11 @@ pub fn check_output<'a>(path: &Path, given: impl IntoIterator<Item = &'a PathBuf
     if found.is_dir() {
         bail!("{name} is a folder; give a file in it after -o");
     }
-    let Ok(place) = fs::canonicalize(path) else { return Ok(()) };
-    let is_it = |input: &&PathBuf| {
-        let is_same = |file: &Path| fs::canonicalize(file).is_ok_and(|file| file == place);
-        is_same(input) || is_beside(input, &place) || names(input, &place)
-    };
-    // Pipes and devices are not replaced.
-    if let Some(input) = given.into_iter().find(is_it).filter(|_| found.is_file()) {
-        bail!(
-            "{name} is an input, too ({}), and would be replaced; give another file after -o",
-            input.display()
-        );
-    }
+    given.into_iter().for_each(|input| note_inputs(std::slice::from_ref(input)));
     check_inputs(path)
 }
 
-/// Refuses an output that is one of the files that were read, whoever named them.
+/// Refuses an output that is one of the inputs, whoever named them. Pipes and devices are not replaced.
 fn check_inputs(path: &Path) -> Result<()> {
     let is_input = fs::canonicalize(path).is_ok_and(|place| place.is_file() && inputs().contains(&place));
     ensure!(
@@ -98,28 +87,6 @@ fn check_inputs(path: &Path) -> Result<()> {
         path.display()
     );
     Ok(())
-}
-
-/// Whether the file at `place` is one that is read with an input of the same name and another ending.
-fn is_beside(input: &Path, place: &Path) -> bool {
-    const TOGETHER: [&[&str]; 3] = [&["raw", "json"], &["mesh", "sol", "meshb", "solb"], &["node", "ele"]];
-    let Ok(input) = fs::canonicalize(input) else { return false };
-    let [a, b] = [input.as_path(), place].map(ending);
-    let are_together =
-        TOGETHER.iter().any(|known| known.contains(&a.as_str()) && known.contains(&b.as_str()));
-    are_together && input.with_extension("") == place.with_extension("")
-}
-
-/// Whether an input that refers to other files, such as a list of pieces, names the file at `place`.
-fn names(input: &Path, place: &Path) -> bool {
-    const LISTS: [&str; 8] = ["pvd", "pvtu", "pvti", "pvtr", "pvts", "mhd", "nhdr", "json"];
-    if !LISTS.contains(&ending(input).as_str()) {
-        return false;
-    }
-    let (Ok(text), Ok(input)) = (fs::read(input), fs::canonicalize(input)) else { return false };
-    let folder = input.parent().unwrap_or(Path::new(""));
-    let Some(name) = place.strip_prefix(folder).ok().and_then(|name| name.to_str()) else { return false };
-    text.windows(name.len().max(1)).any(|window| window == name.as_bytes())
 }
 
 /// The ending of a file's name in lower case, without the dot.

@@ -34,6 +34,12 @@ impl<'a> FilesOf<'a> {
         bytes.at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
     }
 
+    /// The one that was read last.
+    #[cfg(feature = "formats")]
+    pub fn last(&self) -> Option<PathBuf> {
+        self.read.borrow().last().cloned()
+    }
+
     /// All that were read.
     pub fn into_read(self) -> Vec<PathBuf> {
         self.read.into_inner()

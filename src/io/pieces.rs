@@ -128,7 +128,8 @@ impl Pieces {
         for_each_file(document, &beside, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let mut piece = seen.read(reader)?;
-                let MeshPiece { mesh: TetMesh { fields, cell_fields, .. }, .. } = &mut piece;
+                let MeshPiece { mesh: TetMesh { fields, cell_fields, input, .. }, .. } = &mut piece;
+                input.files.0.extend(files.last());
                 fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
                 each(piece)
             })

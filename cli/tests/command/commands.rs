@@ -622,9 +622,10 @@ fn inputs_are_never_replaced() {
     let [list, medit, solution] = ["list.pvd", "a.mesh", "a.sol"].map(|name| folder.path(name));
     fs::write(&list, "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"mesh.vtu\"/></Collection></VTKFile>")
         .expect("a file");
-    [&medit, &solution]
-        .into_iter()
-        .for_each(|path| fs::write(path, "MeshVersionFormatted 2\n").expect("a file"));
+    let head = "MeshVersionFormatted 2\nDimension 3\n";
+    let vertices = "Vertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
+    fs::write(&medit, format!("{head}{vertices}Tetrahedra 1\n1 2 3 4 0\nEnd\n")).expect("a file");
+    fs::write(&solution, format!("{head}SolAtVertices 4\n1 1\n0 1 2 3\nEnd\n")).expect("a file");
     for arguments in [
         &["convert", &mt, "-o", &mt, "--kind", "explicit"][..],
         &["convert", &mt, "-o", &roundabout, "--kind", "explicit"],
@@ -680,6 +681,12 @@ fn inputs_that_others_name_are_never_replaced() {
         }
         assert_eq!(fs::read(&mesh).expect("a file"), before);
     }
+    // A piece of a list that is built piece by piece.
+    let piece = folder.path("sub/piece.mt");
+    fs::copy(&mesh, &piece).expect("a copy");
+    fs::write(&pieces, grid("&#112;iece.mt")).expect("a file");
+    bad(1, &["build", &pieces, "--parts", "2", "-o", &piece], &["is an input, too", "another file"]);
+    assert_eq!(fs::read(&piece).expect("a file"), before);
     // Samples of a header that lies beside them.
     let [header, samples] = ["a.nhdr", "a.mt"].map(|name| folder.path(name));
     fs::write(&samples, [7; 64]).expect("a file");
