@@ -287,9 +287,11 @@ test("a module that gets no more memory ends with a typed error", async () => {
   const main = join(place, "main.mjs");
   try {
     await writeFile(main, script);
-    // 25 MiB.
-    const { stdout } = await promisify(execFile)(process.execPath, ["--wasm-max-mem-pages=400", main]);
-    assert.match(stdout, /^memory: there is not enough memory: the module has \d+ MB/);
+    // In pages of 64 KiB: up to half of what this build takes, so that memory ends at different stages of it.
+    for (const pages of [60, 120, 200]) {
+      const { stdout } = await promisify(execFile)(process.execPath, [`--wasm-max-mem-pages=${pages}`, main]);
+      assert.match(stdout, /^memory: there is not enough memory: the module has \d+ MB/, `${pages} pages`);
+    }
   } finally {
     await rm(place, { recursive: true });
   }
