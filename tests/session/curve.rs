@@ -13,7 +13,7 @@ use tetralod::session::Session;
 const BLOCK_BITS: u32 = 6;
 
 fn file(kind: MtKind) -> Vec<u8> {
-    let mut mesh = generate::sphere_flow(14).expect("a size that is allowed");
+    let mut mesh = generate::sphere_flow(9).expect("a size that is allowed");
     let height = mesh.positions.iter().map(|p| p[2] * p[2] * p[0]).collect();
     mesh.fields.push(Field::new("height", height));
     let config = BuildConfig { block_bits: BLOCK_BITS, all_fields: true, ..BuildConfig::of(kind) };

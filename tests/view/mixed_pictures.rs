@@ -8,7 +8,7 @@ use tetralod::geom::{Camera, Projection};
 use tetralod::gpu::{Colouring, Lighting, Look, Renderer, SIDES, Style, wait};
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Medium, Plane, Slice, Triangles, VIRIDIS};
 
-const SIZE: [u32; 2] = [96, 72];
+const SIZE: [u32; 2] = [64, 48];
 
 fn iso(scene: &Scene, value: f64) -> IsoSurface {
     let mut surface = IsoSurface::new();
