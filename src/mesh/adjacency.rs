@@ -316,6 +316,18 @@ pub(crate) struct DisjointSets {
 
 impl DisjointSets {
     /// So many groups of one number each.
+    pub fn of(len: usize) -> Self {
+        let mut sets = Self::default();
+        sets.reset(len);
+        sets
+    }
+
+    /// How many groups there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// So many groups of one number each.
     pub fn reset(&mut self, len: usize) {
         self.parents.clear();
         self.parents.extend(0..len as u32);
@@ -343,8 +355,7 @@ impl DisjointSets {
 
 /// Parts that hang together by faces.
 pub(crate) fn components(neighbors: &[[u32; 4]]) -> usize {
-    let mut groups = DisjointSets::default();
-    groups.reset(neighbors.len());
+    let mut groups = DisjointSets::of(neighbors.len());
     for (t, sides) in neighbors.iter().enumerate() {
         for &n in sides.iter().filter(|&&n| n != NONE) {
             groups.join(t, n as usize);

@@ -1,7 +1,9 @@
 //! Checks that a mesh is valid and conforming, from plain arrays, by sorting and exact orientation only.
 
+use std::fmt;
+
 use crate::geom::{Groups, orient3d};
-use crate::mesh::{FACES, NONE, boundary_faces};
+use crate::mesh::{DisjointSets, FACES, NONE, boundary_faces};
 use crate::mt::CurrentMesh;
 
 /// An extracted mesh as plain arrays.
@@ -20,19 +22,39 @@ pub struct PlainReference<'a> {
     pub tets: &'a [[u32; 4]],
 }
 
-/// What no update changes.
+/// What no update changes. Where the boundary does not touch itself, the Betti numbers of the mesh follow: its components, its cavities
+/// (boundary surfaces − components) and its tunnels (components + cavities − Euler number).
+#[derive(Debug, PartialEq, Eq)]
 pub struct Shape {
+    /// Parts that hang together by faces.
+    components: usize,
+    /// Parts of the boundary that hang together by edges.
+    surfaces: usize,
     /// Vertices − edges + faces − tetrahedra.
     euler: i64,
+    /// The same of the boundary.
+    boundary_euler: i64,
+    /// Vertices at which the boundary touches itself, ends of such edges, too.
+    touching: usize,
 }
 
 impl Shape {
     pub fn of(reference: &PlainReference<'_>) -> Result<Self, String> {
         let mut around = Around::new(reference.positions.len(), reference.tets)?;
-        let mut faces = Vec::new();
-        let mut count = Counts::default();
-        (0..reference.positions.len() as u32).for_each(|v| count.add(around.at(v, &mut faces), &faces));
-        Ok(Self { euler: count.euler(reference.positions.len(), reference.tets.len()) })
+        let (mut faces, mut count) = (Vec::new(), Counts::new(reference.tets.len()));
+        (0..reference.positions.len() as u32).for_each(|v| count.add(v, around.at(v, &mut faces), &faces));
+        count.shape(reference.positions.len(), reference.tets.len())
+    }
+}
+
+impl fmt::Display for Shape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { components, surfaces, euler, boundary_euler, touching } = self;
+        write!(
+            f,
+            "{components} components, Euler number {euler}, a boundary of {surfaces} surfaces with Euler number {boundary_euler}, which \
+             touches itself at {touching} vertices"
+        )
     }
 }
 
@@ -70,16 +92,14 @@ impl<'a> PlainMesh<'a> {
         self.check_vertices()?;
         self.check_orientation()?;
         let mut around = Around::new(self.positions.len(), self.tets)?;
-        let (mut faces, mut boundary) = (Vec::new(), Vec::new());
-        let mut count = Counts::default();
+        let (mut faces, mut count) = (Vec::new(), Counts::new(self.tets.len()));
         for v in 0..self.positions.len() as u32 {
-            count.add(around.at(v, &mut faces), &faces);
-            self.check_faces(v, &faces, &mut boundary)?;
+            count.add(v, around.at(v, &mut faces), &faces);
+            self.check_faces(&faces)?;
         }
-        check_closed(&boundary)?;
-        let euler = count.euler(self.positions.len(), self.tets.len());
-        if euler != reference.euler {
-            return Err(format!("the Euler number is {euler}, that of the input {}", reference.euler));
+        let shape = count.shape(self.positions.len(), self.tets.len())?;
+        if shape != *reference {
+            return Err(format!("the topology has changed: {shape}; of the input: {reference}"));
         }
         Ok(())
     }
@@ -113,14 +133,12 @@ impl<'a> PlainMesh<'a> {
         }
     }
 
-    /// Compares adjacency with the sorted faces of least vertex `v`. Appends those of the boundary.
-    fn check_faces(&self, v: u32, faces: &[Face], boundary: &mut Vec<[u32; 3]>) -> Result<(), String> {
+    /// Compares adjacency with the sorted faces of one least vertex.
+    fn check_faces(&self, faces: &[Face]) -> Result<(), String> {
         let across = |at: u32| self.neighbors[at as usize / 4][at as usize % 4];
         for group in faces.chunk_by(|a, b| a.others == b.others) {
             match group {
-                &[Face { others, at, .. }] if across(at) == NONE => {
-                    boundary.push([v, (others >> 32) as u32, others as u32]);
-                }
+                &[Face { at, .. }] if across(at) == NONE => {}
                 &[Face { at, .. }] => return Err(format!("tetrahedron {} has a neighbour too many", at / 4)),
                 &[Face { side, at: a, .. }, Face { side: other_side, at: b, .. }] => {
                     if side == other_side {
@@ -191,28 +209,134 @@ impl<'a> Around<'a> {
 }
 
 /// Edges and faces of a mesh, each once.
-#[derive(Default)]
 struct Counts {
     edges: i64,
     faces: i64,
+    /// Tetrahedra that hang together by faces.
+    components: DisjointSets,
+    /// The triangles of the boundary, with vertices in increasing order.
+    boundary: Vec<[u32; 3]>,
 }
 
 impl Counts {
-    fn add(&mut self, larger: usize, faces: &[Face]) {
-        self.edges += larger as i64;
-        self.faces += faces.chunk_by(|a, b| a.others == b.others).count() as i64;
+    fn new(tets: usize) -> Self {
+        Self { edges: 0, faces: 0, components: DisjointSets::of(tets), boundary: Vec::new() }
     }
 
-    fn euler(&self, vertices: usize, tets: usize) -> i64 {
-        vertices as i64 - self.edges + self.faces - tets as i64
+    /// Adds what is at vertex `v`: so many edges, and the sorted faces.
+    fn add(&mut self, v: u32, larger: usize, faces: &[Face]) {
+        self.edges += larger as i64;
+        for group in faces.chunk_by(|a, b| a.others == b.others) {
+            self.faces += 1;
+            if let [Face { others, .. }] = group {
+                self.boundary.push([v, (others >> 32) as u32, *others as u32]);
+            }
+            group.windows(2).for_each(|two| {
+                self.components.join(two[0].at as usize / 4, two[1].at as usize / 4);
+            });
+        }
+    }
+
+    /// The shape of the mesh, whose boundary must be closed.
+    fn shape(self, vertices: usize, tets: usize) -> Result<Shape, String> {
+        let Self { edges, faces, components, boundary } = self;
+        // Each edge with its triangle, and which corner is not its end.
+        let mut ends: Vec<([u32; 2], usize, usize)> = Vec::with_capacity(3 * boundary.len());
+        for (f, &[a, b, c]) in boundary.iter().enumerate() {
+            ends.extend([([b, c], f, 0), ([a, c], f, 1), ([a, b], f, 2)]);
+        }
+        ends.sort_unstable();
+        let mut surfaces = DisjointSets::of(boundary.len());
+        // Corners of triangles that meet at an edge, which no others share, are of one fan around their vertex.
+        let mut fans = DisjointSets::of(3 * boundary.len());
+        let (mut boundary_edges, mut touching) = (0, Vec::new());
+        for group in ends.chunk_by(|a, b| a.0 == b.0) {
+            let (edge, first, apex) = group[0];
+            if group.len() % 2 != 0 {
+                return Err(format!("the boundary is open at the edge {edge:?}"));
+            }
+            boundary_edges += 1;
+            for &(_, other, other_apex) in &group[1..] {
+                surfaces.join(first, other);
+                if group.len() == 2 {
+                    let corner = |f: usize, apex: usize, end: usize| {
+                        3 * f + (0..3).filter(|c| *c != apex).nth(end).unwrap_or(0)
+                    };
+                    (0..2)
+                        .for_each(|end| fans.join(corner(first, apex, end), corner(other, other_apex, end)));
+                }
+            }
+            if group.len() > 2 {
+                touching.extend(edge);
+            }
+        }
+        let mut around: Vec<(u32, usize)> = (0..3 * boundary.len())
+            .map(|corner| (boundary[corner / 3][corner % 3], fans.root(corner)))
+            .collect();
+        around.sort_unstable();
+        around.dedup();
+        let boundary_vertices = around.chunk_by(|a, b| a.0 == b.0).count();
+        touching
+            .extend(around.chunk_by(|a, b| a.0 == b.0).filter(|fans| fans.len() > 1).map(|fans| fans[0].0));
+        touching.sort_unstable();
+        touching.dedup();
+        Ok(Shape {
+            components: components.count(),
+            surfaces: surfaces.count(),
+            euler: vertices as i64 - edges + faces - tets as i64,
+            boundary_euler: boundary_vertices as i64 - boundary_edges + boundary.len() as i64,
+            touching: touching.len(),
+        })
     }
 }
 
-fn check_closed(boundary: &[[u32; 3]]) -> Result<(), String> {
-    let mut edges: Vec<[u32; 2]> = boundary.iter().flat_map(|&[a, b, c]| [[a, b], [a, c], [b, c]]).collect();
-    edges.sort_unstable();
-    match edges.chunk_by(|a, b| a == b).find(|group| group.len() % 2 != 0) {
-        Some(group) => Err(format!("the boundary is open at the edge {:?}", group[0])),
-        None => Ok(()),
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::kuhn_tets;
+
+    /// Components, surfaces, both Euler numbers and touching vertices of some cubes of a grid.
+    fn shape(cubes: [u32; 3], is_there: impl Fn([u32; 3]) -> bool) -> [i64; 5] {
+        let tets = kuhn_tets(cubes.map(|c| c + 1));
+        let [nx, ny, _] = cubes;
+        let place = |cube: u32| [cube % nx, cube / nx % ny, cube / (nx * ny)];
+        let of_cubes = (0..).zip(tets.chunks_exact(6)).filter(|(cube, _)| is_there(place(*cube)));
+        let mut tets: Vec<[u32; 4]> = of_cubes.flat_map(|(_, six)| six).copied().collect();
+        let mut used: Vec<u32> = tets.iter().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        tets.iter_mut().flatten().for_each(|v| *v = used.binary_search(v).unwrap() as u32);
+        let positions = vec![[0; 3]; used.len()];
+        let shape = Shape::of(&PlainReference { positions: &positions, levels: &[], tets: &tets }).unwrap();
+        let Shape { components, surfaces, euler, boundary_euler, touching } = shape;
+        [components as i64, surfaces as i64, euler, boundary_euler, touching as i64]
+    }
+
+    #[test]
+    fn shapes_of_balls_rings_shells_and_what_touches_itself() {
+        assert_eq!(shape([3, 3, 3], |_| true), [1, 1, 1, 2, 0], "a ball");
+        assert_eq!(shape([3, 3, 1], |at| at != [1, 1, 0]), [1, 1, 0, 0, 0], "a ring");
+        assert_eq!(
+            shape([5, 3, 1], |at| at != [1, 1, 0] && at != [3, 1, 0]),
+            [1, 1, -1, -2, 0],
+            "two tunnels"
+        );
+        assert_eq!(shape([3, 3, 3], |at| at != [1, 1, 1]), [1, 2, 2, 4, 0], "a shell");
+        assert_eq!(shape([3, 1, 1], |[x, ..]| x != 1), [2, 2, 2, 4, 0], "two balls");
+        assert_eq!(
+            shape([2, 2, 2], |[x, y, z]| x == y && y == z),
+            [2, 2, 1, 3, 1],
+            "two balls with a vertex in common"
+        );
+        assert_eq!(shape([2, 2, 1], |[x, y, _]| x == y), [2, 1, 1, 3, 2], "two balls with an edge in common");
+        let hollow = |at: [u32; 3]| at != [1, 1, 1] && at != [2, 2, 2];
+        assert_eq!(shape([4, 4, 4], hollow), [1, 3, 3, 5, 1], "two cavities with a vertex in common");
+    }
+
+    #[test]
+    fn open_boundaries_are_found() {
+        let open = [[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 2, 5]];
+        let found = Shape::of(&PlainReference { positions: &[[0; 3]; 6], levels: &[], tets: &open });
+        assert!(found.is_err_and(|error| error.contains("the boundary is open")));
     }
 }

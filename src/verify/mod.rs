@@ -10,7 +10,8 @@
 //! - **Order**: the error of an update is at least that of every update that depends on it, and by as much larger as requests for
 //!   values rely on.
 //! - **Valid meshes**: positive tetrahedra, faces shared by at most two, complete and symmetric adjacency, a closed
-//!   boundary, the reference mesh's Euler number, no vertex without a tetrahedron.
+//!   boundary, no vertex without a tetrahedron, and the topology of the reference mesh: its components, the surfaces of its boundary, the
+//!   Euler numbers of both (which give its tunnels and cavities), and the vertices at which the boundary touches itself.
 //! - **Error**: within the bound of each need, or what the lattices round off ([`MtInfo::floor`](crate::mt::MtInfo::floor)) where
 //!   that is more, at every reference vertex in its part, where the input has it.
 //!   Of those that the boundary has left outside, a place on it that is near enough counts: a displacement `d` is an error

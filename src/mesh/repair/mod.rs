@@ -193,8 +193,7 @@ impl Work {
         if pairs.is_empty() {
             return 0;
         }
-        let mut sets = DisjointSets::default();
-        sets.reset(self.mesh.positions.len());
+        let mut sets = DisjointSets::of(self.mesh.positions.len());
         pairs.iter().for_each(|&(a, b)| sets.join(a as usize, b as usize));
         let target: Vec<usize> = (0..self.mesh.positions.len()).map(|v| sets.root(v)).collect();
         let mut merged = 0;

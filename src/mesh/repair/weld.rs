@@ -72,8 +72,7 @@ pub(super) fn places(positions: &[[f64; 3]], mut points: Vec<u32>, distance: f64
         }
         return places;
     }
-    let mut sets = DisjointSets::default();
-    sets.reset(positions.len());
+    let mut sets = DisjointSets::of(positions.len());
     // Cubes as large as the distance: points that are closer are in neighbouring ones.
     let cube = |v: u32| at(v).map(|x| (x / distance).floor() as i64);
     let mut cubes: Vec<([i64; 3], u32)> = points.iter().map(|&v| (cube(v), v)).collect();
@@ -123,8 +122,7 @@ mod tests {
         };
         let points: Vec<[f64; 3]> = (0..300).map(|_| [random(), random(), random()]).collect();
         for distance in [0.01, 0.05, 0.1, 0.2] {
-            let mut sets = DisjointSets::default();
-            sets.reset(300);
+            let mut sets = DisjointSets::of(300);
             for (v, w) in (0..300).flat_map(|v| (0..v).map(move |w| (v, w))) {
                 if within(&points, v, w, distance) {
                     sets.join(v as usize, w as usize);
