@@ -45,10 +45,8 @@ pub fn all(inputs: &[&str]) -> Result<Vec<Set>> {
 fn read(path: &Path) -> Option<Set> {
     let name = path.file_name()?.to_str()?.to_owned();
     let read = || -> Result<Option<TetMesh>> {
-        let mut mesh = io::read_with(
-            path,
-            &ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 },
-        )?;
+        let mut mesh =
+            io::read_with(path, &ReadOptions { cells: CellData::Values, ..ReadOptions::default() })?;
         if mesh.tets.is_empty() {
             return Ok(None);
         }

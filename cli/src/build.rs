@@ -2,6 +2,7 @@
 
 use super::files;
 use super::input;
+use super::machine;
 use super::output::{self, Verbosity, bytes, count};
 use super::parse;
 use super::parts::{self, InPieces};
@@ -42,9 +43,9 @@ pub struct Arguments {
     /// memory, than one part. The file depends on it; it is a little larger.
     #[arg(long, value_name = "N", conflicts_with = "part")]
     parts: Option<u32>,
-    /// The most memory that building may take, as 8G: what needs more, by its counts, is built in parts (kind half-edge), in a folder
-    /// beside the output that is removed afterwards; what needs more than that is refused before the work begins. K, M and G are powers
-    /// of 1024.
+    /// The most memory that reading and building may take, as 8G: what needs more, by its counts, is built in parts (kind half-edge), in a
+    /// folder beside the output that is removed afterwards; what needs more than that is refused, as soon as its size is known. K, M and G
+    /// are powers of 1024. If nothing is said: the memory of the machine, of which half is for reading; nothing is parted.
     #[arg(long, value_name = "BYTES", value_parser = parse::parse_bytes)]
     memory: Option<u64>,
     #[command(flatten)]
@@ -274,7 +275,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(built) = build_pieces(arguments, &config, output)? {
         return finish(arguments, &config, (built, start), repaired_as(String::new()));
     }
-    let (mut mesh, mut repaired) = options.read(&config, level, may_part)?;
+    let (mut mesh, mut repaired) = options.read(&config, level, arguments.memory, may_part)?;
     // Inputs may name others.
     files::check_output(output, &[])?;
     let [points, tetrahedra] = mesh.counts();
@@ -336,7 +337,7 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
     if is_whole || config.min_dihedral.is_some() {
         return Ok(None);
     }
-    options.in_pieces(config, |input| {
+    options.in_pieces(config, arguments.memory, |input| {
         let way = match arguments.parts {
             Some(count) => Way::Parts(count),
             None => {
@@ -400,13 +401,14 @@ impl BuildOptions {
         Ok(repair)
     }
 
-    /// Reads what is wanted of the input.
+    /// Reads what is wanted of the input, in so much memory at most.
     ///
     /// If it may be built in parts, a regular grid comes without points and tetrahedra where only its values are needed.
     pub fn read(
         &self,
         config: &BuildConfig,
         level: RepairLevel,
+        memory: Option<u64>,
         in_parts: bool,
     ) -> Result<(TetMesh, RepairReport)> {
         let with_labels = !config.preserve.is_empty();
@@ -419,9 +421,8 @@ impl BuildOptions {
             && config.min_dihedral.is_none()
             && !config.fields.iter().any(needs_points);
         input::expect_format(&self.inputs, self.format.as_deref());
-        let format = self.format.as_deref();
-        let (mut mesh, repaired) =
-            input::read_cells(&self.inputs, &wanted, level, (format, self.step), alone)?;
+        let source = input::Source { format: self.format.as_deref(), step: self.step, memory };
+        let (mut mesh, repaired) = input::read_cells(&self.inputs, &wanted, level, source, alone)?;
         let is_label = |field: &&Field| config.preserve.contains(&field.name);
         let labels: Vec<Field> = mesh.cell_fields.iter().filter(is_label).cloned().collect();
         match self.cell_to_point {
@@ -461,6 +462,7 @@ impl BuildOptions {
     pub fn in_pieces<T>(
         &self,
         config: &BuildConfig,
+        memory: Option<u64>,
         work: impl FnOnce(InPieces<'_>) -> Result<Option<T>>,
     ) -> Result<Option<T>> {
         let needs_points = |name: &String| GeometryField::named(name).is_some();
@@ -482,7 +484,8 @@ impl BuildOptions {
             labels: &config.preserve,
             cells: CellData::Names,
         };
-        let options = ReadOptions { step: step.number, ..wanted.options() };
+        let memory = input::Source { memory, ..input::Source::default() }.limit();
+        let options = ReadOptions { step: step.number, memory, ..wanted.options() };
         let Some(pieces) = Pieces::open(&step.path, &options)? else { return Ok(None) };
         let prepare = |mesh: &mut TetMesh| {
             files::note_inputs(&mesh.input.files.0);
@@ -552,6 +555,11 @@ fn way(
             ))
             .with_context(|| options.name())
         }
+        None if let Some(most) = machine::memory().filter(|most| needed > *most) => Err(anyhow!(
+            "{what} of memory at most, more than there is ({}): with --memory it is built in parts, or tried all the same",
+            bytes(most)
+        ))
+        .with_context(|| options.name()),
         _ => {
             if needed >= MUCH_MEMORY {
                 tell(format!("{what} of memory at most"));

@@ -1,12 +1,12 @@
 //! Meshes from files: time steps put together, mended, fields at cells turned into fields at points.
 
 use super::files::{self, Opened};
-use super::output;
+use super::{machine, output};
 use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::io;
-use tetralod::io::{CellData, FieldSelection, ReadOptions, Step};
+use tetralod::io::{CellData, FieldSelection, MemoryLimit, ReadOptions, Step};
 use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, repair_at};
 use tetralod::verify::Reference;
 
@@ -19,7 +19,26 @@ pub fn read(
     wanted: &FieldSelection<'_>,
     level: RepairLevel,
 ) -> Result<(TetMesh, RepairReport)> {
-    read_as(paths, wanted, level, (None, None))
+    read_as(paths, wanted, level, Source::default())
+}
+
+/// What is known of an input beside its paths.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Source<'a> {
+    /// The format of the standard input.
+    pub format: Option<&'a str>,
+    /// The only time step that is wanted.
+    pub step: Option<usize>,
+    /// The most memory, in bytes, that reading may take; half of what the machine has if nothing is said, for building takes more.
+    pub memory: Option<u64>,
+}
+
+impl Source<'_> {
+    /// The most memory that reading may take.
+    pub fn limit(&self) -> MemoryLimit {
+        let most = self.memory.or_else(|| Some(machine::memory()? / 2));
+        most.map_or(MemoryLimit::NONE, MemoryLimit::of)
+    }
 }
 
 /// What a path stands for the standard input.
@@ -39,14 +58,14 @@ pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
     }
 }
 
-/// As [`read`], of which the standard input has a format, and only one time step is wanted if `step` is given.
+/// As [`read`], with what is known of the source.
 pub fn read_as(
     paths: &[PathBuf],
     wanted: &FieldSelection<'_>,
     level: RepairLevel,
-    which: (Option<&str>, Option<usize>),
+    source: Source<'_>,
 ) -> Result<(TetMesh, RepairReport)> {
-    let (mut mesh, report) = read_cells(paths, wanted, level, which, false)?;
+    let (mut mesh, report) = read_cells(paths, wanted, level, source, false)?;
     if wanted.cells == CellData::Values {
         mesh.cells_to_points();
     }
@@ -60,21 +79,22 @@ pub fn read_cells(
     paths: &[PathBuf],
     wanted: &FieldSelection<'_>,
     level: RepairLevel,
-    (format, step): (Option<&str>, Option<usize>),
+    source: Source<'_>,
     alone: bool,
 ) -> Result<(TetMesh, RepairReport)> {
     let mut steps = steps(paths)?;
-    if let Some(step) = step {
+    if let Some(step) = source.step {
         choose(&mut steps, step)?;
     }
+    let memory = source.limit();
     let mut input = Vec::new();
     if steps.iter().any(|step| step.path == Path::new(STANDARD_INPUT)) {
         std::io::stdin().read_to_end(&mut input).context("the standard input could not be read")?;
-        check_format(&input, format)?;
+        check_format(&input, source.format)?;
     }
     let named: Vec<_> = steps.iter().map(|step| (name(&step.path), step.time)).collect();
     let mesh = io::read_time_steps(&named, wanted, &mut |number, options| {
-        let options = &ReadOptions { step: steps[number].number, ..options.clone() };
+        let options = &ReadOptions { step: steps[number].number, memory: memory.clone(), ..options.clone() };
         match &steps[number].path {
             path if path == Path::new(STANDARD_INPUT) => io::read_bytes_with(&name(path), &input, options),
             path if alone && steps.len() == 1 => io::read_unexpanded(path, options),
@@ -187,7 +207,7 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
     let is_one = fields.iter().all(|field| field.time == time);
     let step = time.filter(|_| is_one).map(|time| step_at(paths, time)).transpose()?.flatten();
     let level = opened.repair_level();
-    let (mut mesh, _) = read_cells(paths, &wanted, level, (None, step), true)?;
+    let (mut mesh, _) = read_cells(paths, &wanted, level, Source { step, ..Source::default() }, true)?;
     let is_known = |name: &String| mesh.fields.iter().any(|field| field.answers_to(name));
     if mesh.is_grid_alone() && !names.iter().all(is_known) {
         // Fields of the geometry need its points.

@@ -14,6 +14,7 @@ mod info;
 mod input;
 mod isosurface;
 mod join;
+mod machine;
 mod needs;
 mod npz;
 mod output;

@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut config = options.config();
     config.keep_points = options.restrictions.points()?;
     let metadata = options.metadata(&config);
-    let by_pieces = options.in_pieces(&config, |input| {
+    let by_pieces = options.in_pieces(&config, None, |input| {
         let part = |folder: &Path| {
             Folder(folder).part_pieces(&input, &config, *parts, metadata.clone())?.map_err(Into::into)
         };
@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let plan = if let Some(plan) = by_pieces.with_context(|| options.name())? {
         plan
     } else {
-        let (mesh, repaired) = options.read(&config, options.repair.level(), true)?;
+        let (mesh, repaired) = options.read(&config, options.repair.level(), None, true)?;
         options.repair_of(&mesh, &repaired, Way::Parts(*parts), verbosity)?;
         let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata);
         files::fill_folder(output, Path::new(PLAN), part).with_context(|| options.name())?

@@ -5,33 +5,47 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::in_file;
+use crate::io::memory::{FileBytes, MemoryLimit};
 
 /// The files of a mesh: the one that was given, and those beside it as they are read.
 pub(super) struct FilesOf<'a> {
     given: &'a Path,
+    memory: &'a MemoryLimit,
     read: RefCell<Vec<PathBuf>>,
 }
 
 impl<'a> FilesOf<'a> {
-    pub fn new(given: &'a Path) -> Self {
-        Self { given, read: RefCell::new(vec![given.to_owned()]) }
+    /// Their bytes count in the limit.
+    pub fn new(given: &'a Path, memory: &'a MemoryLimit) -> Self {
+        Self { given, memory, read: RefCell::new(vec![given.to_owned()]) }
     }
 
     /// Reads the file that the given one calls `name`.
-    pub fn load(&self, name: &str) -> Result<Vec<u8>, ReadReason> {
+    pub fn load(&self, name: &str) -> Result<FileBytes<'static>, ReadReason> {
         let path = place(self.given, name)?;
-        let bytes = std::fs::read(&path).map_err(|e| ReadReason::Io(format!("\"{name}\": {e}")));
+        let bytes = self.bytes_of(&path, |e| ReadReason::Io(format!("\"{name}\": {e}")));
         self.read.borrow_mut().push(path);
         bytes
     }
 
     /// Reads the given file, or the one of this name beside it.
-    pub fn load_one(&self, path: &Path) -> Result<Vec<u8>, ReadError> {
+    pub fn load_one(&self, path: &Path) -> Result<FileBytes<'static>, ReadError> {
         let bytes = match path.file_name().and_then(|name| name.to_str()) {
             Some(name) if path != self.given => self.load(name),
-            _ => std::fs::read(path).map_err(|e| ReadReason::Io(e.to_string())),
+            _ => self.bytes_of(path, |e| ReadReason::Io(e.to_string())),
         };
         bytes.at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
+    }
+
+    fn bytes_of(
+        &self,
+        path: &Path,
+        reason: impl Fn(std::io::Error) -> ReadReason,
+    ) -> Result<FileBytes<'static>, ReadReason> {
+        // Pipes have no length.
+        let length = std::fs::metadata(path).map_err(&reason)?.len();
+        let held = self.memory.hold(length)?;
+        Ok(FileBytes::new(std::fs::read(path).map_err(&reason)?, held))
     }
 
     /// The one that was read last.
@@ -94,15 +108,20 @@ mod tests {
         symlink("../outside", case.join("outer")).expect("a link");
         symlink("/dev/zero", case.join("device")).expect("a link");
         symlink("..", case.join("up")).expect("a link");
-        let files = FilesOf { given: &case.join("list"), read: RefCell::default() };
-        assert_eq!(files.load("a").expect("a file"), b"case/a");
-        assert_eq!(files.load("./sub/b").expect("a file"), b"case/sub/b");
-        assert_eq!(files.load("inner").expect("a link within the folder"), b"case/sub/b");
+        let (list, memory) = (case.join("list"), MemoryLimit::of(12));
+        let files = FilesOf::new(&list, &memory);
+        let content = |name| files.load(name).map(|file| file.to_vec());
+        assert_eq!(content("a").expect("a file"), b"case/a");
+        assert_eq!(content("./sub/b").expect("a file"), b"case/sub/b");
+        assert_eq!(content("inner").expect("a link within the folder"), b"case/sub/b");
+        let held = files.load("a").expect("a file");
+        assert_eq!(files.load("sub/b").err(), Some(ReadReason::Memory { limit: 12 }));
+        drop(held);
         for name in ["outer", "device", "up/outside", "sub", "../outside", "/dev/zero", ""] {
             assert!(matches!(files.load(name), Err(ReadReason::Unsupported { .. })), "{name}");
         }
         assert!(matches!(files.load("none"), Err(ReadReason::Io(_))));
-        assert_eq!(files.into_read().len(), 4);
+        assert_eq!(files.into_read().len(), 7);
         let _ = fs::remove_dir_all(&folder);
     }
 }

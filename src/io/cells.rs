@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::io::MemoryLimit;
 use crate::io::cell_shapes::{PYRAMID_14, Recipe, middles, recipe};
 use crate::io::error::{ReadReason, cell_name, names};
 use crate::io::vtu::{GHOST_CELL, HIDDEN_CELL};
@@ -251,8 +252,8 @@ pub(super) struct CellList {
 
 impl CellList {
     /// Splits the cells, and drops them.
-    pub fn split(self, numbering: &Numbering) -> Result<Split, ReadReason> {
-        split(&self, numbering)
+    pub fn split(self, numbering: &Numbering, memory: &MemoryLimit) -> Result<Split, ReadReason> {
+        split(&self, numbering, memory)
     }
 
     /// Which of so many points cells with a volume use.
@@ -314,6 +315,7 @@ impl CellList {
 fn split(
     CellList { types, ends, connectivity }: &CellList,
     numbering: &Numbering,
+    memory: &MemoryLimit,
 ) -> Result<Split, ReadReason> {
     let mut split = Split::default();
     if !types.is_empty() && types.iter().all(|kind| [HIDDEN, GHOST].contains(kind)) {
@@ -325,6 +327,8 @@ fn split(
     if types.len() > u32::MAX as usize || room > u32::MAX as usize {
         return Err(ReadReason::TooLarge { what: "cells".into(), limit: u64::from(u32::MAX) });
     }
+    // With the number of its cell.
+    memory.take(20 * tets)?;
     split.tets.reserve_exact(room);
     let (mut start, mut recipes) = (0, Recipes::default());
     let (mut vertices, mut known) = (Vec::new(), BitSet::default());
@@ -374,7 +378,7 @@ mod tests {
         let ends = [3, 7, 15];
         assert_eq!(checked_ends(&types, &ends), Ok(15));
         let cells = CellList { types: types.to_vec(), ends: ends.to_vec(), connectivity };
-        let split = cells.split(&numbering(8)).unwrap();
+        let split = cells.split(&numbering(8), &MemoryLimit::default()).unwrap();
         assert_eq!((split.tets.len(), split.tets[0]), (7, [100, 101, 102, 103]));
         let mut fields = [Field::new("m", vec![5.0, 6.0, 7.0]), Field::new("only named", Vec::new())];
         split.spread(&mut fields);
@@ -409,7 +413,7 @@ mod tests {
         assert!(wrong(&[4, i64::MIN]).contains("before it begins"));
         let split = |connectivity: &[i64]| {
             let cells = CellList { types: vec![10], ends: vec![4], connectivity: connectivity.to_vec() };
-            cells.split(&numbering(4))
+            cells.split(&numbering(4), &MemoryLimit::default())
         };
         let missing = |point| split(&[0, 1, 2, point]).unwrap_err();
         assert_eq!(missing(4), ReadReason::MissingPoint { cell: 0, point: 4, points: 4 });

@@ -104,6 +104,12 @@ pub enum ReadReason {
         /// How many points there are.
         points: u64,
     },
+    /// Reading takes more memory than is allowed.
+    #[error("reading it takes more memory than the {} that are allowed; allow more, or read fewer fields", mebibytes(*.limit))]
+    Memory {
+        /// How many bytes are allowed.
+        limit: u64,
+    },
     /// More than this program handles.
     #[error("more than {limit} {what}; split the data")]
     TooLarge {
@@ -112,6 +118,11 @@ pub enum ReadReason {
         /// The largest number allowed.
         limit: u64,
     },
+}
+
+/// Bytes in words.
+fn mebibytes(bytes: u64) -> String {
+    if bytes < 10 << 20 { format!("{bytes} bytes") } else { format!("{} MiB", bytes >> 20) }
 }
 
 fn not_finite(array: &str, owner: &str, number: u64) -> String {

@@ -5,8 +5,8 @@
 
 use std::collections::HashMap;
 
-use crate::io::ReadOptions;
 use crate::io::error::ReadReason;
+use crate::io::{MemoryLimit, ReadOptions};
 use crate::mesh::{Field, TetMesh, VectorPart};
 
 /// Most fields of a mesh that are read.
@@ -23,6 +23,8 @@ pub(super) struct Collector<'a> {
     first: bool,
     /// Whether only names are wanted.
     lists: bool,
+    /// What values are counted in.
+    memory: MemoryLimit,
     /// Every name that an array has taken, wanted or not, with the last number that was put behind it: what a field is called does
     /// not depend on what is wanted.
     names: HashMap<String, usize>,
@@ -46,7 +48,7 @@ impl<'a> Collector<'a> {
     pub fn new(options: &'a ReadOptions) -> Self {
         let none: &[String] = &[];
         let wanted = options.fields.as_deref().or(options.first.then_some(none));
-        Self { wanted, first: options.first, ..Self::default() }
+        Self { wanted, first: options.first, memory: options.memory.clone(), ..Self::default() }
     }
 
     /// Collects fields at cells beside these at points.
@@ -165,11 +167,19 @@ impl<'a> Collector<'a> {
     }
 
     /// Appends the fields of an array. [`check_finite`] looks at the values when it is known which points are used.
-    pub fn fill(&mut self, claim: Claim, values: Vec<f64>, integer: bool, unit: &str) {
+    pub fn fill(
+        &mut self,
+        claim: Claim,
+        values: Vec<f64>,
+        integer: bool,
+        unit: &str,
+    ) -> Result<(), ReadReason> {
         let Claim { fields, components, wanted } = claim;
+        let _held = self.memory.hold(8 * values.len() as u64)?;
         for (c, (mut field, _)) in
             fields.into_iter().zip(wanted).enumerate().filter(|(_, (_, wanted))| *wanted)
         {
+            self.memory.take(8 * (values.len() / components) as u64)?;
             field.unit = unit.to_owned();
             field.integer = integer && c < components;
             field.values = if c == components {
@@ -180,6 +190,7 @@ impl<'a> Collector<'a> {
             self.fields.push(field);
             self.last += 1;
         }
+        Ok(())
     }
 
     /// Leaves the fields that are named alone: where points have a field, that is the first one.
@@ -321,7 +332,7 @@ mod tests {
         values: Vec<f64>,
     ) -> Result<(), ReadReason> {
         if let Some(claim) = to.claim(name, components)? {
-            to.fill(claim, values, true, "m");
+            return to.fill(claim, values, true, "m");
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::structured::{self, Ghosts};
 use crate::io::vtu::PieceReader;
 use crate::io::xml::Document;
-use crate::io::{Beside, CellData, ReadOptions, Survey, for_each_file, vtu};
+use crate::io::{Beside, CellData, MemoryLimit, ReadOptions, Survey, for_each_file, vtu};
 use crate::mesh::{Field, Grid, TetMesh};
 
 /// Most points of a grid: 512³. Its tetrahedra take some 13 GB.
@@ -74,11 +74,13 @@ impl Placement {
     }
 
     /// The mesh of a grid, without points and tetrahedra if it lies along the axes and nothing else needs them.
-    pub fn mesh(&self, values: GridValues) -> Result<TetMesh, ReadReason> {
-        match self.grid()? {
-            Some(grid) => grid_mesh(grid, values),
-            None => structured::mesh(structured::checked_dims(self.dims)?, self.positions()?, values),
+    pub fn mesh(&self, values: GridValues, memory: &MemoryLimit) -> Result<TetMesh, ReadReason> {
+        if let Some(grid) = self.grid()? {
+            return grid_mesh(grid, values, memory);
         }
+        let dims = structured::checked_dims(self.dims)?;
+        memory.expect(structured::bytes(dims))?;
+        structured::mesh(dims, self.positions()?, values, memory)
     }
 }
 
@@ -95,8 +97,8 @@ pub(super) struct GridValues {
 }
 
 /// The mesh of a grid along the axes.
-pub(super) fn grid_mesh(grid: Grid, values: GridValues) -> Result<TetMesh, ReadReason> {
-    structured::with_values(TetMesh { grid: Some(grid), ..TetMesh::default() }, grid.dims, values)
+pub(super) fn grid_mesh(grid: Grid, values: GridValues, memory: &MemoryLimit) -> Result<TetMesh, ReadReason> {
+    structured::with_values(TetMesh { grid: Some(grid), ..TetMesh::default() }, grid.dims, values, memory)
 }
 
 /// Reads a document of type `ImageData`, or `PImageData` with the files that it lists, and its time.
@@ -108,7 +110,7 @@ pub(super) fn read(
     let whole_place = || format!("<{}>", document.kind);
     let (placement, whole) = read_placement(document).at(whole_place)?;
     let mut grid = InParts::default();
-    let time = for_each_file(document, beside, &mut |file| {
+    let time = for_each_file(document, (beside, &options.memory), &mut |file| {
         for (number, piece) in file.full_pieces() {
             let reader = PieceReader { document: file, piece, number, options };
             grid.add(&reader, whole, Vec::new())?;
@@ -116,7 +118,7 @@ pub(super) fn read(
         Ok(())
     })?;
     let values = grid.finish(whole).at(whole_place)?;
-    Ok((placement.mesh(values).at(whole_place)?, time))
+    Ok((placement.mesh(values, &options.memory).at(whole_place)?, time))
 }
 
 /// A grid whose values come in parts.

@@ -11,7 +11,7 @@ use crate::io::image::{GridValues, Placement};
 use crate::io::number::NumberType;
 use crate::io::structured::Ghosts;
 use crate::io::vtu::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
-use crate::io::{CellData, ReadOptions, Survey, cells, image, points_from, structured};
+use crate::io::{CellData, MemoryLimit, ReadOptions, Survey, cells, image, points_from, structured};
 use crate::mesh::{Field, MeshInput, TetMesh};
 
 /// How every legacy file starts.
@@ -455,6 +455,8 @@ struct Body<'a> {
     fields: Collector<'a>,
     cell_fields: Collector<'a>,
     cell_data: CellData,
+    /// What the mesh is counted in.
+    memory: MemoryLimit,
     /// VTK's flags of hidden points and cells.
     ghosts: [Option<Vec<i64>>; 2],
     /// What is left out is noted here.
@@ -471,7 +473,14 @@ struct Body<'a> {
 impl<'a> Body<'a> {
     fn new(options: &'a ReadOptions, time: Option<f64>) -> Self {
         let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options));
-        Self { fields, cell_fields, cell_data: options.cells, time, ..Self::default() }
+        Self {
+            fields,
+            cell_fields,
+            cell_data: options.cells,
+            memory: options.memory.clone(),
+            time,
+            ..Self::default()
+        }
     }
 
     /// Reads the section that `keyword` announces.
@@ -646,8 +655,7 @@ impl<'a> Body<'a> {
         let numbers = file.floats(found, *kind)?.unwrap_or_default();
         self.tuples = self.tuples.max(head.tuples);
         let fields = if at_cells { &mut self.cell_fields } else { &mut self.fields };
-        fields.fill(claim, numbers, kind.is_integer(), "");
-        Ok(())
+        fields.fill(claim, numbers, kind.is_integer(), "")
     }
 
     /// The fields at cells, of which there are `cells`, beside those at points.
@@ -670,6 +678,7 @@ impl<'a> Body<'a> {
 
     /// The mesh of these points and cells, of which one has values that were read.
     fn mesh(mut self, positions: Vec<[f64; 3]>, listed: Option<CellList>) -> Result<TetMesh, ReadError> {
+        self.memory.take(24 * positions.len() as u64).at(|| "POINTS".into())?;
         let used = || listed.as_ref().map(|listed| listed.used(positions.len()));
         check_finite(&positions, &self.fields.fields, &used).at(|| "POINT_DATA".into())?;
         let mut mesh = TetMesh { positions, input: std::mem::take(&mut self.input), ..TetMesh::default() };
@@ -678,7 +687,7 @@ impl<'a> Body<'a> {
             let is_there = |cell: usize| listed.types.get(cell).is_some_and(|kind| !cells::is_flat(*kind));
             check_finite_cells(&mesh.cell_fields, is_there).at(|| "CELL_DATA".into())?;
             let numbering = Numbering::From { first: 0, points: mesh.positions.len() };
-            let split = listed.split(&numbering).at(|| "CELLS".into())?;
+            let split = listed.split(&numbering, &self.memory).at(|| "CELLS".into())?;
             split.spread(&mut mesh.cell_fields);
             mesh.tets = split.tets;
             mesh.input.append(split.input);
@@ -801,6 +810,7 @@ impl<'a> Body<'a> {
         }
         let coordinates = std::mem::take(&mut self.coordinates);
         self.expect_tuples(structured::cubes(dims))?;
+        self.memory.expect(2 * structured::bytes(dims)).at(|| "DIMENSIONS".into())?;
         self.curvilinear(points_from(&structured::rectilinear(&coordinates)))
     }
 
@@ -816,7 +826,7 @@ impl<'a> Body<'a> {
         // As many points as there are cannot be claimed.
         self.tuples = self.tuples.max(positions.len());
         let values = self.values(structured::cubes(dims))?;
-        structured::mesh(dims, positions, values).at(|| "POINTS".into())
+        structured::mesh(dims, positions, values, &self.memory).at(|| "POINTS".into())
     }
 
     fn structured(mut self) -> Result<TetMesh, ReadError> {
@@ -824,7 +834,7 @@ impl<'a> Body<'a> {
         check_values(&self.fields, placement.dims.iter().product()).at(|| "POINT_DATA".into())?;
         let dims = structured::checked_dims(placement.dims).at(|| "DIMENSIONS".into())?;
         let values = self.values(structured::cubes(dims))?;
-        placement.mesh(values).at(|| "POINT_DATA".into())
+        placement.mesh(values, &self.memory).at(|| "POINT_DATA".into())
     }
 }
 

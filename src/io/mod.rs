@@ -40,6 +40,7 @@ mod foreign;
 mod formats;
 mod image;
 mod legacy;
+mod memory;
 mod number;
 mod packed;
 mod payload;
@@ -61,6 +62,7 @@ mod xz;
 
 pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
+pub use memory::MemoryLimit;
 #[cfg(feature = "formats")]
 pub use pieces::{PieceCounts, Pieces};
 pub use pvd::{Step, steps, write_pvd};
@@ -74,6 +76,7 @@ use std::path::Path;
 
 use crate::io::beside::FilesOf;
 use crate::io::error::At;
+use crate::io::memory::FileBytes;
 use crate::mesh::{TetMesh, straighten};
 
 /// What to read of a file.
@@ -89,6 +92,8 @@ pub struct ReadOptions {
     pub cells: CellData,
     /// Which step to read of a file that has several (see [`Step::number`]): the first one is 0. Others have one.
     pub step: usize,
+    /// The most memory that reading may take.
+    pub memory: MemoryLimit,
 }
 
 /// What to do with fields at cells.
@@ -118,7 +123,8 @@ pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
 /// # Errors
 /// As [`read`]; a field that is wanted and not there is no error.
 pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    read_unexpanded(path, options).map(expanded)
+    let read = read_unexpanded(path, options)?;
+    expanded(read, options).at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
 }
 
 /// The same mesh with finite numbers at points that no cell uses, without cells that fold because they were cut into straight
@@ -131,9 +137,12 @@ fn settled(mut mesh: TetMesh) -> TetMesh {
 }
 
 /// The same mesh with the points and tetrahedra of a grid.
-fn expanded(mut mesh: TetMesh) -> TetMesh {
+fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadReason> {
+    if let Some(grid) = mesh.grid.filter(|_| mesh.is_grid_alone()) {
+        options.memory.take(structured::bytes(grid.dims))?;
+    }
     mesh.expand_grid();
-    mesh
+    Ok(mesh)
 }
 
 /// As [`read_with`], but a regular grid without values at its cells comes without points and tetrahedra, which follow from it: see
@@ -150,10 +159,10 @@ fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErr
     if path.is_dir() {
         return Err(foreign::refused_folder(path)).at(String::new).map_err(|error| in_file(error, &name));
     }
-    let files = FilesOf::new(path);
+    let files = FilesOf::new(path, &options.memory);
     let mut mesh = match lower_extension(path).as_str() {
-        "json" => read_raw_by_sidecar(&files, path, None)?,
-        "raw" => read_raw_by_sidecar(&files, &path.with_extension("json"), Some(path))?,
+        "json" => read_raw_by_sidecar(&files, path, None, &options.memory)?,
+        "raw" => read_raw_by_sidecar(&files, &path.with_extension("json"), Some(path), &options.memory)?,
         #[cfg(feature = "formats")]
         "node" | "ele" => formats::tetgen::read(&files, path, options)?,
         _ => match read_ranges(path, options) {
@@ -195,11 +204,12 @@ pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Resul
         let what = format!("a file that needs another (\"{file}\")");
         Err(ReadReason::Unsupported { what, remedy: "give it by its path, with the other beside it".into() })
     };
-    read_in(name, bytes, options, &alone).map(settled).map(expanded)
+    let read = read_in(name, bytes, options, &alone).map(settled)?;
+    expanded(read, options).at(String::new).map_err(|e| in_file(e, name))
 }
 
 /// Gets the bytes of another file, by its path from the folder of the one that is read.
-type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, ReadReason>;
+type Beside<'a> = &'a dyn Fn(&str) -> Result<FileBytes<'static>, ReadReason>;
 
 /// Reads a file that may refer to others.
 fn read_in(
@@ -208,8 +218,8 @@ fn read_in(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Result<TetMesh, ReadError> {
-    let unpacked = packed::unpacked(bytes).at(String::new).map_err(|e| in_file(e, name))?;
-    let (bytes, name) = (unpacked.as_ref(), without_gz(name));
+    let unpacked = packed::unpacked(bytes, &options.memory).at(String::new).map_err(|e| in_file(e, name))?;
+    let (bytes, name) = (&*unpacked, without_gz(name));
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::read(bytes, options)
@@ -245,7 +255,9 @@ fn read_other(name: &str, bytes: &[u8], _: &ReadOptions, _: Beside<'_>) -> Resul
 /// # Errors
 /// If the sidecar does not say what is needed, or the samples are not as many as it says.
 pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, ReadError> {
-    let mesh = raw::Sidecar::parse(sidecar).and_then(|s| s.mesh(samples)).map(expanded);
+    let options = ReadOptions::default();
+    let mesh =
+        raw::Sidecar::parse(sidecar).and_then(|s| expanded(s.mesh(samples, &options.memory)?, &options));
     mesh.at(String::new).map_err(|e| in_file(e, name))
 }
 
@@ -253,6 +265,7 @@ fn read_raw_by_sidecar(
     files: &FilesOf<'_>,
     sidecar_path: &Path,
     samples_path: Option<&Path>,
+    memory: &MemoryLimit,
 ) -> Result<TetMesh, ReadError> {
     let name = sidecar_path.display().to_string();
     let sidecar =
@@ -263,7 +276,10 @@ fn read_raw_by_sidecar(
         (None, None) => sidecar_path.with_extension("raw"),
     };
     let samples = files.load_one(&samples_path)?;
-    sidecar.mesh(&samples).at(String::new).map_err(|e| in_file(e, &samples_path.display().to_string()))
+    sidecar
+        .mesh(&samples, memory)
+        .at(String::new)
+        .map_err(|e| in_file(e, &samples_path.display().to_string()))
 }
 
 fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {
@@ -290,10 +306,10 @@ const IN_FILES: char = 'P';
 /// Reads a document with the pieces of a grid.
 type ReadFile<'a> = &'a mut dyn FnMut(&xml::Document<'_>) -> Result<(), ReadError>;
 
-/// Has `read` read the document, or the files that it lists; returns the time of the first one that has one.
+/// Has `read` read the document, or the files that it lists, whose bytes count in the limit; returns the time of the first one that has one.
 fn for_each_file(
     document: &xml::Document<'_>,
-    beside: Beside<'_>,
+    beside: (Beside<'_>, &MemoryLimit),
     read: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
     if !document.kind.starts_with(IN_FILES) {
@@ -306,7 +322,7 @@ fn for_each_file(
 #[cfg(feature = "formats")]
 fn read_listed(
     document: &xml::Document<'_>,
-    beside: Beside<'_>,
+    beside: (Beside<'_>, &MemoryLimit),
     read: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
     pvtu::for_each_file(document, beside, read)
@@ -315,7 +331,7 @@ fn read_listed(
 #[cfg(not(feature = "formats"))]
 fn read_listed(
     document: &xml::Document<'_>,
-    _: Beside<'_>,
+    _: (Beside<'_>, &MemoryLimit),
     _: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
     Err(not_read(&document.kind)).at(String::new)
@@ -372,8 +388,8 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start()
 }
 
-fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
-    FilesOf::new(path).load_one(path)
+fn load<'a>(path: &Path, memory: &MemoryLimit) -> Result<FileBytes<'a>, ReadError> {
+    FilesOf::new(path, memory).load_one(path)
 }
 
 /// Names the file of an error that does not name another one.

@@ -6,6 +6,7 @@ use std::io::Read;
 use flate2::read::MultiGzDecoder;
 
 use crate::io::error::ReadReason;
+use crate::io::memory::{FileBytes, Held, MemoryLimit};
 
 /// The first bytes of a file in gzip.
 const GZIP: &[u8] = b"\x1f\x8b\x08";
@@ -34,16 +35,16 @@ pub(super) fn is_gzip(bytes: &[u8]) -> bool {
 }
 
 /// The bytes of a file, unpacked if it is in gzip.
-pub(super) fn unpacked(bytes: &[u8]) -> Result<Cow<'_, [u8]>, ReadReason> {
+pub(super) fn unpacked<'a>(bytes: &'a [u8], memory: &MemoryLimit) -> Result<FileBytes<'a>, ReadReason> {
     if is_gzip(bytes) {
-        return unpack(bytes, MOST_BYTES).map(Cow::Owned);
+        return unpack(bytes, MOST_BYTES, memory);
     }
     match OTHERS.iter().find(|(first, ..)| bytes.starts_with(first)) {
         Some((_, packer, command)) => Err(ReadReason::Unsupported {
             what: format!("a file that is packed with {packer}"),
             remedy: format!("unpack it first (with {command}, for example); of packed files gzip is read"),
         }),
-        None => Ok(Cow::Borrowed(bytes)),
+        None => Ok(FileBytes::new(bytes, Held::default())),
     }
 }
 
@@ -65,13 +66,14 @@ pub(super) fn stated_size(bytes: &[u8]) -> u64 {
 }
 
 /// Unpacks a file, by steps so that no more is allocated than there is.
-fn unpack(bytes: &[u8], most: u64) -> Result<Vec<u8>, ReadReason> {
+fn unpack(bytes: &[u8], most: u64, memory: &MemoryLimit) -> Result<FileBytes<'static>, ReadReason> {
     let damaged = |error: std::io::Error| ReadReason::Damaged(format!("gzip: {error}"));
     let too_large = || ReadReason::TooLarge { what: "bytes when it is unpacked".into(), limit: most };
     let mut decoder = MultiGzDecoder::new(bytes);
-    let mut data = Vec::new();
+    let (mut data, mut held) = (Vec::new(), memory.hold(0)?);
     loop {
         let before = data.len();
+        held.grow(STEP as u64)?;
         // Doubled, so that few are moved; but not more than fits.
         data.try_reserve(STEP).map_err(|_| too_large())?;
         (&mut decoder).take(STEP as u64).read_to_end(&mut data).map_err(damaged)?;
@@ -79,7 +81,7 @@ fn unpack(bytes: &[u8], most: u64) -> Result<Vec<u8>, ReadReason> {
             return Err(too_large());
         }
         if data.len() == before {
-            return Ok(data);
+            return Ok(FileBytes::new(data, held));
         }
     }
 }
@@ -100,22 +102,30 @@ mod tests {
     #[test]
     fn gzip_is_unpacked_and_bounded() {
         let file = vec![7; 3 * STEP + 5];
+        let unpacked = |bytes: &[u8]| unpacked(bytes, &MemoryLimit::default()).map(|file| file.to_vec());
         let mut members = packed(&file[..STEP]);
         assert_eq!(unpacked(&members).unwrap().len(), STEP);
         assert_eq!(stated_size(&members), (members.len() + STEP) as u64);
         members.extend(packed(&file[STEP..]));
         assert_eq!(unpacked(&members).unwrap(), file);
         assert_eq!(head(&members).as_ref(), &file[..STEP]);
-        assert!(matches!(unpack(&members, STEP as u64), Err(ReadReason::TooLarge { .. })));
+        let no_limit = &MemoryLimit::default();
+        assert!(matches!(unpack(&members, STEP as u64, no_limit), Err(ReadReason::TooLarge { .. })));
+        let least = (file.len() + 2 * STEP) as u64;
+        assert!(unpack(&members, MOST_BYTES, &MemoryLimit::of(least)).is_ok());
+        assert!(matches!(
+            unpack(&members, MOST_BYTES, &MemoryLimit::of(least / 2)),
+            Err(ReadReason::Memory { .. })
+        ));
         for length in 3..members.len() {
             assert!(!unpacked(&members[..length]).is_ok_and(|bytes| bytes.len() == file.len()), "{length}");
         }
-        assert_eq!(unpacked(b"plain").unwrap(), &b"plain"[..]);
+        assert_eq!(unpacked(b"plain").unwrap(), b"plain");
     }
 
     #[test]
     fn other_packers_are_named() {
-        let refused = |bytes: &[u8]| unpacked(bytes).unwrap_err().to_string();
+        let refused = |bytes: &[u8]| unpacked(bytes, &MemoryLimit::default()).unwrap_err().to_string();
         assert!(refused(b"BZh91AY").contains("bzip2"));
         assert!(refused(b"PK\x03\x04").contains("ZIP"));
         assert!(refused(b"\x78\x9c\0").contains("zlib"));

@@ -45,11 +45,11 @@ impl Pieces {
     /// # Errors
     /// If the list cannot be read or is damaged.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Option<Self>, ReadError> {
-        let bytes = load(path)?;
-        let bytes = packed::unpacked(&bytes)
+        let bytes = load(path, &options.memory)?;
+        let bytes = packed::unpacked(&bytes, &options.memory)
             .at(String::new)
             .map_err(|e| in_file(e, &path.display().to_string()))?
-            .into_owned();
+            .to_vec();
         if super::format_of(&bytes) != Some("pvtu") {
             return Ok(None);
         }
@@ -63,9 +63,9 @@ impl Pieces {
     pub fn counts(&self) -> Result<PieceCounts, ReadError> {
         let document = Document::parse(without_mark(&self.list)).map_err(|error| self.named(error))?;
         let mut counts = PieceCounts::default();
-        let files = FilesOf::new(&self.path);
+        let files = FilesOf::new(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
-        let counted = for_each_file(&document, &beside, &mut |file| {
+        let counted = for_each_file(&document, (&beside, &self.options.memory), &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let points = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
                 let tets = reader.most_tets()?;
@@ -113,10 +113,10 @@ impl Pieces {
         document: &Document<'_>,
         each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
     ) -> Result<(), ReadError> {
-        let files = FilesOf::new(&self.path);
+        let files = FilesOf::new(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
         let mut hashes = Vec::new();
-        let time = for_each_file(document, &beside, &mut |file| {
+        let time = for_each_file(document, (&beside, &self.options.memory), &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let points = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
                 hashes.extend(reader.points(points)?.into_iter().map(hash));
@@ -125,7 +125,7 @@ impl Pieces {
         })?;
         let time = document.time().or(time);
         let mut seen = Seen { several: repeated(hashes), ..Seen::default() };
-        for_each_file(document, &beside, &mut |file| {
+        for_each_file(document, (&beside, &self.options.memory), &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let mut piece = seen.read(reader)?;
                 let MeshPiece { mesh: TetMesh { fields, cell_fields, input, .. }, .. } = &mut piece;
@@ -142,9 +142,11 @@ impl Pieces {
         document: &Document<'_>,
         read: &mut dyn FnMut(&PieceReader<'_, '_>) -> Result<(), ReadError>,
     ) -> Result<(), ReadError> {
-        let options = &self.options;
-        let mut pieces = document.full_pieces();
-        pieces.try_for_each(|(number, piece)| read(&PieceReader { document, piece, number, options }))
+        document.full_pieces().try_for_each(|(number, piece)| {
+            // What is passed on is no longer here.
+            let options = &ReadOptions { memory: self.options.memory.afresh(), ..self.options.clone() };
+            read(&PieceReader { document, piece, number, options })
+        })
     }
 }
 

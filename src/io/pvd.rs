@@ -12,7 +12,7 @@ use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::formats;
 use crate::io::write::escaped;
 use crate::io::xml::Attributes;
-use crate::io::{beside, in_file, load, lower_extension, packed, without_gz};
+use crate::io::{MemoryLimit, beside, in_file, load, lower_extension, packed, without_gz};
 
 /// A file that holds one time step.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,8 +40,9 @@ pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
         }
         return Ok(times.into_iter().map(Some).enumerate().map(step).collect());
     }
-    let listed =
-        load(path).and_then(|bytes| packed::unpacked(&bytes).and_then(|bytes| parse(&bytes)).at(String::new));
+    let no_limit = &MemoryLimit::default();
+    let listed = load(path, no_limit)
+        .and_then(|bytes| packed::unpacked(&bytes, no_limit).and_then(|bytes| parse(&bytes)).at(String::new));
     let listed = listed.map_err(|error| in_file(error, &path.display().to_string()))?;
     let step = |(time, file): (Option<f64>, String)| {
         let path = beside::place(path, &file).at(String::new)?;

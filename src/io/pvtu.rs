@@ -11,7 +11,7 @@ use crate::io::cells::Numbering;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::vtu::{NumberPoints, PieceReader, first_number, join};
 use crate::io::xml::Document;
-use crate::io::{Beside, IN_FILES, ReadFile, ReadOptions, in_file, packed, without_mark};
+use crate::io::{Beside, IN_FILES, MemoryLimit, ReadFile, ReadOptions, in_file, packed, without_mark};
 use crate::mesh::TetMesh;
 
 /// Reads a document of type `PUnstructuredGrid`, and the time of its pieces.
@@ -21,14 +21,14 @@ pub(super) fn read(
     beside: Beside<'_>,
 ) -> Result<(TetMesh, Option<f64>), ReadError> {
     let mut whole = Whole::default();
-    let time = for_each_file(document, beside, &mut |file| whole.append(file, options))?;
+    let time = for_each_file(document, (beside, &options.memory), &mut |file| whole.append(file, options))?;
     Ok((whole.mesh, time))
 }
 
 /// Has `read` read the files that are listed, one after the other; returns the time of the first one that has one.
 pub(super) fn for_each_file(
     document: &Document<'_>,
-    beside: Beside<'_>,
+    (beside, memory): (Beside<'_>, &MemoryLimit),
     read: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
     let mut time = None;
@@ -36,7 +36,7 @@ pub(super) fn for_each_file(
         let missing = || ReadReason::Missing("attribute Source".into());
         let source = piece.attributes.get("Source").ok_or_else(missing).at(|| format!("piece {number}"))?;
         let bytes = beside(source).at(|| format!("piece {number}"))?;
-        let bytes = packed::unpacked(&bytes).at(|| format!("piece {number}"))?;
+        let bytes = packed::unpacked(&bytes, memory).at(|| format!("piece {number}"))?;
         let mut read_file = || {
             let mut file = Document::parse(without_mark(&bytes))?;
             source.clone_into(&mut file.name);

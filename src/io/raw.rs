@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::io::error::ReadReason;
 use crate::io::image::GridValues;
 use crate::io::number::NumberType;
-use crate::io::{Survey, image};
+use crate::io::{MemoryLimit, Survey, image};
 use crate::mesh::{Field, Grid, TetMesh};
 
 /// What a sidecar says.
@@ -63,7 +63,7 @@ impl Sidecar {
     }
 
     /// The mesh of these samples.
-    pub fn mesh(&self, samples: &[u8]) -> Result<TetMesh, ReadReason> {
+    pub fn mesh(&self, samples: &[u8], memory: &MemoryLimit) -> Result<TetMesh, ReadReason> {
         let points: u64 = self.grid.dims.iter().map(|d| u64::from(*d)).product();
         let expected = points * self.number.size() as u64;
         if samples.len() as u64 != expected {
@@ -73,13 +73,14 @@ impl Sidecar {
                 found: samples.len() as u64,
             });
         }
+        memory.take(8 * points)?;
         let values = self.number.floats(samples, self.big);
         let field = Field {
             unit: self.unit.clone(),
             integer: self.number.is_integer(),
             ..Field::new(self.field.clone(), values)
         };
-        image::grid_mesh(self.grid, GridValues { fields: vec![field], ..GridValues::default() })
+        image::grid_mesh(self.grid, GridValues { fields: vec![field], ..GridValues::default() }, memory)
     }
 }
 

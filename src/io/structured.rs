@@ -8,7 +8,7 @@ use crate::io::fields::{check_finite, check_finite_cells, component_of};
 use crate::io::image::{self, Extent, GridValues, MAX_GRID_POINTS};
 use crate::io::vtu::{HIDDEN_POINT, PieceReader};
 use crate::io::xml::Document;
-use crate::io::{Beside, ReadOptions, Survey, cells, for_each_file, vtu};
+use crate::io::{Beside, MemoryLimit, ReadOptions, Survey, cells, for_each_file, vtu};
 use crate::mesh::{CellNumbers, Field, MeshInput, TetMesh, kuhn_tets};
 
 /// Points along each axis: at least two, and not too many together.
@@ -24,6 +24,12 @@ pub(super) fn cubes(dims: [u32; 3]) -> usize {
 /// How many tetrahedra they are split into.
 pub(super) fn most_tets(dims: [u64; 3]) -> u64 {
     dims.iter().map(|d| d.saturating_sub(1)).fold(6, u64::saturating_mul)
+}
+
+/// Bytes of the points and tetrahedra of a grid.
+pub(super) fn bytes(dims: [u32; 3]) -> u64 {
+    let points: u64 = dims.iter().map(|d| u64::from(*d)).product();
+    24 * points + 6 * 16 * cubes(dims) as u64
 }
 
 /// The positions of a grid with these coordinates along each axis.
@@ -80,13 +86,15 @@ pub(super) fn mesh(
     dims: [u32; 3],
     positions: Vec<[f64; 3]>,
     values: GridValues,
+    memory: &MemoryLimit,
 ) -> Result<TetMesh, ReadReason> {
     let expected = dims.iter().map(|d| u64::from(*d)).product();
     if positions.len() as u64 != expected {
         let found = positions.len() as u64;
         return Err(ReadReason::Count { what: "points".into(), expected, found });
     }
-    with_values(TetMesh { positions, tets: kuhn_tets(dims), ..TetMesh::default() }, dims, values)
+    memory.take(bytes(dims))?;
+    with_values(TetMesh { positions, tets: kuhn_tets(dims), ..TetMesh::default() }, dims, values, memory)
 }
 
 /// A grid, alone or with its points and tetrahedra, with its values and without what is hidden.
@@ -94,6 +102,7 @@ pub(super) fn with_values(
     mut mesh: TetMesh,
     dims: [u32; 3],
     values: GridValues,
+    memory: &MemoryLimit,
 ) -> Result<TetMesh, ReadReason> {
     let GridValues { fields, cubes, ghosts, others: [other_fields, other_cell_fields] } = values;
     let left_out = ghosts.left_out(dims);
@@ -103,6 +112,9 @@ pub(super) fn with_values(
     mesh.input = MeshInput { other_fields, other_cell_fields, ..MeshInput::default() };
     let count = self::cubes(dims);
     if left_out.is_some() || mesh.cell_fields.iter().any(|field| !field.values.is_empty()) {
+        if mesh.is_grid_alone() {
+            memory.take(bytes(dims))?;
+        }
         mesh.expand_grid();
     }
     let Some(left_out) = left_out else {
@@ -153,7 +165,7 @@ pub(super) fn read(
     let place = || format!("<{}>", document.kind);
     let (whole, dims) = whole(document).at(place)?;
     let mut grid = image::InParts::default();
-    let time = for_each_file(document, beside, &mut |file| {
+    let time = for_each_file(document, (beside, &options.memory), &mut |file| {
         for (number, piece) in file.full_pieces() {
             let reader = PieceReader { document: file, piece, number, options };
             grid.add(&reader, whole, coordinates(&reader, whole)?)?;
@@ -169,7 +181,7 @@ pub(super) fn read(
     let axes = std::mem::replace(&mut values.fields, rest);
     let point = |p: usize| [0, 1, 2].map(|axis| axes[axis].values[p]);
     let positions = (0..axes[0].values.len()).map(point).collect();
-    Ok((mesh(dims.map(|d| d as u32), positions, values).at(place)?, time))
+    Ok((mesh(dims.map(|d| d as u32), positions, values, &options.memory).at(place)?, time))
 }
 
 /// Says what a document of type `RectilinearGrid` or `StructuredGrid` contains.

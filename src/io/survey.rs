@@ -3,7 +3,7 @@
 use crate::io::error::{At, ReadError, ReadReason};
 #[cfg(feature = "formats")]
 use crate::io::{CellData, ReadOptions, formats};
-use crate::io::{foreign, image, in_file, legacy, packed, raw, structured, vtu, xml};
+use crate::io::{MemoryLimit, foreign, image, in_file, legacy, packed, raw, structured, vtu, xml};
 use crate::mesh::{Field, Grid};
 
 /// What a file says that it contains. The data may be damaged even so.
@@ -60,8 +60,9 @@ impl Survey {
 /// # Errors
 /// As [`read_bytes`](super::read_bytes), as far as that follows from the structure of the file.
 pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
-    let unpacked = packed::unpacked(bytes).at(String::new).map_err(|e| in_file(e, name))?;
-    let bytes = unpacked.as_ref();
+    let unpacked =
+        packed::unpacked(bytes, &MemoryLimit::default()).at(String::new).map_err(|e| in_file(e, name))?;
+    let bytes = &*unpacked;
     let start = super::without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::survey(bytes)

@@ -93,7 +93,7 @@ impl PieceReader<'_, '_> {
             }
         };
         let numbering = numbers(&positions).at(place)?;
-        let split = listed.map(|listed| listed.split(&numbering)).transpose();
+        let split = listed.map(|listed| listed.split(&numbering, &self.options.memory)).transpose();
         let split = split.at(|| format!("{}, <Cells>, array \"connectivity\"", place()))?.unwrap_or_default();
         split.spread(&mut cell_fields);
         let mut input = MeshInput { other_fields, other_cell_fields, ..split.input };
@@ -118,8 +118,9 @@ impl PieceReader<'_, '_> {
             let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? else {
                 continue;
             };
+            self.expect_numbers(tuples.saturating_mul(components)).at(|| array.place())?;
             let values = self.document.floats(array, tuples, components).at(|| array.place())?;
-            collector.fill(claim, values, number.is_integer(), array.unit());
+            collector.fill(claim, values, number.is_integer(), array.unit()).at(|| array.place())?;
         }
         Ok([collector.fields, collector.others])
     }
@@ -157,6 +158,8 @@ impl PieceReader<'_, '_> {
             let (what, found) = ("components of the points".into(), components as u64);
             return Err(ReadReason::Count { what, expected: 3, found }).at(|| array.place());
         }
+        self.options.memory.take((points as u64).saturating_mul(24)).at(|| array.place())?;
+        self.expect_numbers(points.saturating_mul(3)).at(|| array.place())?;
         let values = self.document.floats(array, points, 3).at(|| array.place())?;
         Ok(points_from(&values))
     }
@@ -172,6 +175,8 @@ impl PieceReader<'_, '_> {
             found.ok_or_else(missing).at(|| self.place())
         };
         let types = find("types")?;
+        // Types and ends.
+        self.expect_numbers(cells.saturating_mul(2)).at(|| types.place())?;
         let mut kinds = self.document.integers(types, cells).at(|| types.place())?;
         if cells::are_points(&kinds) {
             return Ok(None);
@@ -185,6 +190,7 @@ impl PieceReader<'_, '_> {
         cells::most_tets(&kinds).at(|| types.place())?;
         let length = cells::checked_ends(&kinds, &ends).at(|| offsets.place())?;
         let connectivity = find("connectivity")?;
+        self.expect_numbers(length).at(|| connectivity.place())?;
         let list = self.document.integers(connectivity, length).at(|| connectivity.place())?;
         let mut list = CellList { types: kinds, ends, connectivity: list };
         if let Some(swapped) = swapped {
@@ -194,6 +200,11 @@ impl PieceReader<'_, '_> {
             list.leave_out(&ghosts);
         }
         Ok(Some(list))
+    }
+
+    /// Checks that there is room for so many numbers, unpacked and decoded, which are at most eight bytes each.
+    fn expect_numbers(&self, count: usize) -> Result<(), ReadReason> {
+        self.options.memory.expect((count as u64).saturating_mul(16))
     }
 
     /// The tetrahedra at most that the cells become.

@@ -8,7 +8,7 @@ use crate::builder::{self, BuildConfig, BuildError, BuildProgress, BuildSummary,
 use crate::format::{EncodeError, EncodeOptions, encode};
 use crate::geom::Bounds;
 use crate::io::{
-    self, CellData, FieldSelection, ReadError, ReadOptions, ReadReason, Survey, TimeStepsError,
+    self, CellData, FieldSelection, MemoryLimit, ReadError, ReadOptions, ReadReason, Survey, TimeStepsError,
     read_time_steps,
 };
 use crate::mesh::{self, Field, GeometryField, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh};
@@ -242,7 +242,9 @@ impl MeshBuilder {
         let total = steps.len() as u64;
         let cells = if cells { CellData::Values } else { CellData::Names };
         let wanted = FieldSelection { names: &config.fields, all: config.all_fields, labels: &[], cells };
+        let memory = MemoryLimit::of(self.memory);
         let mut read = |number: usize, options: &ReadOptions| {
+            let options = &ReadOptions { memory: memory.clone(), ..options.clone() };
             let file = files.get_mut(number).and_then(Option::take).unwrap_or_default();
             stages.count("parse", number as u64, total);
             file.read(options)
@@ -518,6 +520,7 @@ impl From<ReadError> for WebError {
             }
             ReadReason::Truncated { .. } => "truncated",
             ReadReason::TooLarge { .. } => "limit",
+            ReadReason::Memory { .. } => "memory",
             ReadReason::NotFinite { .. } | ReadReason::NotFiniteCell { .. } => "bad-mesh",
             ReadReason::Syntax(_)
             | ReadReason::Missing(_)

@@ -6,7 +6,7 @@ use tetralod::mesh::TetMesh;
 use tetralod::{io, mesh};
 
 fn everything(name: &str, file: &[u8]) -> TetMesh {
-    let options = ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
+    let options = ReadOptions { cells: CellData::Values, ..ReadOptions::default() };
     io::read_bytes_with(name, file, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -53,7 +53,7 @@ fn every_truncation_is_refused_or_harmless() {
 
 #[test]
 fn no_bit_flip_panics_and_no_mesh_is_inconsistent() {
-    let everything = ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
+    let everything = ReadOptions { cells: CellData::Values, ..ReadOptions::default() };
     for (name, mut file, _) in files() {
         for bit in 0..8 * file.len() {
             file[bit / 8] ^= 1 << (bit % 8);

@@ -15,9 +15,8 @@ fn cells(cells: CellData) -> ReadOptions {
 fn only(names: &[&str], cells: CellData) -> ReadOptions {
     ReadOptions {
         fields: Some(names.iter().map(|&name| name.to_owned()).collect()),
-        first: false,
         cells,
-        step: 0,
+        ..ReadOptions::default()
     }
 }
 

@@ -10,6 +10,7 @@ mod fields;
 mod files;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+mod memory;
 #[cfg(feature = "formats")]
 mod meshers;
 mod odd;

@@ -20,13 +20,15 @@ fn assert_agrees(survey: &Survey, mesh: &TetMesh, name: &str) {
     assert!(survey.fields.iter().chain(&survey.cell_fields).all(|field| field.values.is_empty()), "{name}");
 }
 
-const EVERYTHING: ReadOptions = ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
+fn everything() -> ReadOptions {
+    ReadOptions { cells: CellData::Values, ..ReadOptions::default() }
+}
 
 #[test]
 fn of_every_format_and_encoding() {
     for (name, file, _) in files() {
         let survey = io::survey(&name, &file).unwrap();
-        assert_agrees(&survey, &io::read_bytes_with(&name, &file, &EVERYTHING).unwrap(), &name);
+        assert_agrees(&survey, &io::read_bytes_with(&name, &file, &everything()).unwrap(), &name);
         let mesh = io::read_bytes(&name, &file).unwrap();
         assert_eq!(survey.cells, mesh.tets.len() as u64, "{name}");
         assert!(name.ends_with(survey.format), "{name} is {}", survey.format);
@@ -43,7 +45,7 @@ fn of_cut_and_flipped_files_that_can_be_read() {
     for (name, mut file, _) in files() {
         let agrees = |file: &[u8], what: &str| {
             let survey = io::survey(&name, file);
-            if let Ok(mesh) = io::read_bytes_with(&name, file, &EVERYTHING) {
+            if let Ok(mesh) = io::read_bytes_with(&name, file, &everything()) {
                 assert_agrees(&survey.unwrap(), &mesh, &format!("{name} {what}"));
             }
         };

@@ -22,7 +22,7 @@ const MOST_CELLS: u32 = 36;
 
 /// The mesh as the builder gets it, with its first field; none with a reason.
 fn read(path: &Path) -> Result<TetMesh, String> {
-    let options = ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
+    let options = ReadOptions { cells: CellData::Values, ..ReadOptions::default() };
     let mesh = read_with(path, &options).map_err(|error| error.to_string())?;
     let mut mesh = repair(thinned(mesh)).map_err(|error| error.to_string())?.0;
     mesh.cells_to_points();

@@ -24,6 +24,44 @@ fn what_needs_too_much_memory_is_refused_before_it_is_built() {
     good(&["build", &input, "-o", &mt, "--memory", "8M"]);
 }
 
+/// Arrays that share their place in the file, 100 of 128³ values each, take 1.7 GB when they are read.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_small_file_takes_no_more_memory_than_there_is() {
+    let folder = Folder::new("shared");
+    let [input, mt] = ["shared.vti", "a.mt"].map(|name| folder.path(name));
+    let (samples, extent) = (vec![0_u8; 1 << 21], "0 127 0 127 0 127");
+    let array =
+        |i: u32| format!("<DataArray type=\"UInt8\" Name=\"f{i}\" format=\"appended\" offset=\"0\"/>");
+    let arrays: String = (0..100).map(array).collect();
+    let head = format!(
+        "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"> \
+         <ImageData WholeExtent=\"{extent}\"><Piece Extent=\"{extent}\"><PointData>{arrays}\
+         </PointData></Piece></ImageData><AppendedData encoding=\"raw\">_"
+    );
+    let length = (samples.len() as u64).to_le_bytes();
+    fs::write(&input, [head.as_bytes(), &length, &samples, b"</AppendedData></VTKFile>"].concat())
+        .expect("a file");
+    // In kibibytes: programs take much address space that is no memory.
+    let limited = |space: u32, more: &[&str]| {
+        let script = format!("ulimit -v {space}; exec \"$@\"");
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_tetralod"), "build", &input, "-o", &mt]);
+        let output = shell.args(more).output().expect("the command starts");
+        (output.status.code(), text(&output.stderr).to_owned())
+    };
+    let (code, error) = limited(1 << 20, &["--memory", "200M", "--all-fields"]);
+    assert_eq!(code, Some(1), "{error}");
+    assert!(error.contains("more memory than the 200 MiB that are allowed"), "{error}");
+    // Without a limit: the address space, of which half is for reading.
+    let (code, error) = limited(1 << 20, &["--all-fields"]);
+    assert_eq!(code, Some(1), "{error}");
+    assert!(error.contains("more memory than the 512 MiB that are allowed"), "{error}");
+    let (code, error) = limited(1 << 20, &["--field", "f3"]);
+    assert_eq!(code, Some(1), "{error}");
+    assert!(error.contains("more than there is (1 GiB)"), "{error}");
+}
+
 #[test]
 fn from_data_to_a_checked_mesh() {
     let folder = Folder::new("chain");

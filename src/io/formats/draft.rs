@@ -79,7 +79,7 @@ impl<'a> Draft<'a> {
         read: impl FnOnce() -> Result<Vec<f64>, ReadReason>,
     ) -> Result<(), ReadReason> {
         if let Some(claim) = self.fields.claim(name, components)? {
-            self.fields.fill(claim, read()?, integer, "");
+            return self.fields.fill(claim, read()?, integer, "");
         }
         Ok(())
     }
@@ -108,7 +108,7 @@ impl<'a> Draft<'a> {
         }
         match self.cell_fields.claim(name, components)? {
             Some(claim) if self.options.cells == CellData::Names => self.cell_fields.keep_names(claim, ""),
-            Some(claim) => self.cell_fields.fill(claim, read()?, integer, ""),
+            Some(claim) => self.cell_fields.fill(claim, read()?, integer, "")?,
             None => {}
         }
         Ok(())
@@ -116,6 +116,8 @@ impl<'a> Draft<'a> {
 
     /// The mesh. Without cells it has points alone.
     pub fn finish(mut self) -> Result<TetMesh, ReadReason> {
+        let memory = &self.options.memory;
+        memory.take(8 * self.coordinates.len() as u64)?;
         let positions = points_from(&self.coordinates);
         if positions.len() > u32::MAX as usize {
             return Err(ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) });
@@ -145,7 +147,7 @@ impl<'a> Draft<'a> {
         let cells = self.list.types.len();
         cells::checked_ends(&self.list.types, &self.list.ends)?;
         let numbering = Numbering::From { first: 0, points: positions.len() };
-        let split = self.list.split(&numbering)?;
+        let split = self.list.split(&numbering, memory)?;
         let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
         check_finite_cells(&cell_fields, |_| true)?;
         split.spread(&mut cell_fields);

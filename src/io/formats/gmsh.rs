@@ -241,8 +241,7 @@ impl<'a> Mesh<'a> {
             ViewAt::Nodes => {
                 let Some(claim) = self.draft.fields.claim(name, *components)? else { return Ok(()) };
                 let values = self.at_nodes(&view.rows, *components)?;
-                self.draft.fields.fill(claim, values, false, "");
-                Ok(())
+                self.draft.fields.fill(claim, values, false, "")
             }
             ViewAt::Elements => {
                 let cells = &self.cell_tags;
@@ -367,8 +366,13 @@ mod tests {
     use super::*;
     use crate::io::CellData;
 
-    const EVERYTHING: ReadOptions =
-        ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
+    const EVERYTHING: ReadOptions = ReadOptions {
+        fields: None,
+        first: false,
+        cells: CellData::Values,
+        step: 0,
+        memory: crate::io::MemoryLimit::NONE,
+    };
 
     /// A tetrahedron and a triangle, with tags that are not in order.
     pub(super) const TWO: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 \"a $b\"\n$EndPhysicalNames\n\

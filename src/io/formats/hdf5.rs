@@ -81,23 +81,26 @@ pub(in crate::io) fn read_at(path: &Path, options: &ReadOptions) -> Option<Resul
 
 /// The times of the steps in the file at `path`; none if it is not one of these, or has no steps.
 pub(in crate::io) fn times_at(path: &Path) -> Result<Vec<f64>, ReadError> {
-    let times = open(path).at(String::new).and_then(|storage| match storage.map(content).transpose()? {
-        Some(Content::Vtkhdf(file)) => vtkhdf::times(&file),
-        Some(Content::Exodus(file)) => exodus::times(&file),
-        None => Ok(Vec::new()),
+    let times = open(path).at(String::new).and_then(|storage| {
+        match storage.map(|storage| content(storage, u64::MAX)).transpose()? {
+            Some(Content::Vtkhdf(file)) => vtkhdf::times(&file),
+            Some(Content::Exodus(file)) => exodus::times(&file),
+            None => Ok(Vec::new()),
+        }
     });
     times.map_err(|error| in_file(error, &path.display().to_string()))
 }
 
 fn read_from(storage: DynStorage, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    match content(storage)? {
+    match content(storage, options.memory.most())? {
         Content::Vtkhdf(file) => vtkhdf::read(&file, options),
         Content::Exodus(file) => exodus::read(&file, options),
     }
 }
 
-fn content(storage: DynStorage) -> Result<Content, ReadError> {
-    let limit = usize::try_from(storage.len().saturating_mul(MOST_UNPACKED)).unwrap_or(usize::MAX);
+/// Opens a file, of which at most so many bytes are read at once.
+fn content(storage: DynStorage, most: u64) -> Result<Content, ReadError> {
+    let limit = usize::try_from(storage.len().saturating_mul(MOST_UNPACKED).min(most)).unwrap_or(usize::MAX);
     let limit = limit.max(FEW_BYTES);
     let chunk = limit.min(hdf5_reader::DEFAULT_MAX_CHUNK_BYTES);
     let start = storage.read_range(0, storage.len().min(HDF5.len() as u64) as usize);

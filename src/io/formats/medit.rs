@@ -263,19 +263,20 @@ pub(super) fn components_of(kind: i64) -> Result<usize, ReadReason> {
 mod tests {
     use super::*;
     use crate::io::CellData;
+    use crate::io::memory::FileBytes;
 
     const MESH: &str = " MeshVersionFormatted 2\nDimension\n3\n# a comment\nVertices\n5\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 2\n\
         0 0 -1 2\nTriangles\n1\n1 2 3 7\nRequiredVertices 1 2\nTetrahedra\n2\n1 2 3 4 5\n1 3 2 5 6\nEnd\n";
     const SOL: &str = "MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n5\n2 1 2\n1 0 0 9\n2 0 0 9\n3 0 0 9\n4 0 0 9\n5 0 0 9\nEnd\n";
 
     fn read_both(mesh: &str, sol: &str) -> Result<TetMesh, ReadError> {
-        let options = ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
+        let options = ReadOptions { cells: CellData::Values, ..ReadOptions::default() };
         let beside = |name: &str| match (name, sol) {
             ("a.sol", "") => Err(ReadReason::Io("none".into())),
             ("a.sol", sol) => Ok(sol.as_bytes().to_vec()),
             other => panic!("{other:?}"),
         };
-        read(mesh.as_bytes(), "a.sol", &options, &beside)
+        read(mesh.as_bytes(), "a.sol", &options, &|name| beside(name).map(FileBytes::from))
     }
 
     #[test]

@@ -273,7 +273,7 @@ mod tests {
             [] => Err(ReadReason::Io("none".into())),
             solution => Ok(solution.to_vec()),
         };
-        read(mesh, "a.solb", &options, &beside)
+        read(mesh, "a.solb", &options, &|name| beside(name).map(Into::into))
     }
 
     #[test]

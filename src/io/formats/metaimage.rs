@@ -28,6 +28,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
     let (header, rest) = read_header(bytes).at(|| "header".into())?;
     let volume = header.volume().at(|| "header".into())?;
     let expected = volume.bytes().at(|| "header".into())?;
+    let _held = options.memory.hold(expected as u64).at(|| "samples".into())?;
     let samples = |data: &[u8], count: usize| header.samples(data, &volume, count);
     let names = header.files(rest, volume.dims).at(|| "ElementDataFile".into())?;
     let samples = if names.is_empty() {
@@ -241,6 +242,7 @@ fn number_type(name: &str) -> Option<NumberType> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::memory::FileBytes;
     use flate2::{Compression, write::ZlibEncoder};
     use std::io::Write;
 
@@ -256,7 +258,7 @@ mod tests {
             "a.raw" => Ok([vec![9; 5], samples()].concat()),
             other => Err(ReadReason::Io(other.into())),
         };
-        read(bytes, &ReadOptions::default(), &beside)
+        read(bytes, &ReadOptions::default(), &|name| beside(name).map(FileBytes::from))
     }
 
     #[test]
@@ -298,14 +300,17 @@ mod tests {
             "BinaryData = False\nElementDataFile = a.txt\n",
         ] {
             let file = format!("{header}{file}");
-            let mesh = read(file.as_bytes(), &ReadOptions::default(), &beside)
-                .unwrap_or_else(|e| panic!("{file}: {e}"));
+            let mesh =
+                read(file.as_bytes(), &ReadOptions::default(), &|name| beside(name).map(FileBytes::from))
+                    .unwrap_or_else(|e| panic!("{file}: {e}"));
             assert_eq!(mesh.fields[0].values, [0., 1., 2., 3., 4., 5., 6., 7.], "{file}");
         }
         let refused = |file: &str| {
-            read(format!("{HEADER}{file}").as_bytes(), &ReadOptions::default(), &beside)
-                .unwrap_err()
-                .to_string()
+            read(format!("{HEADER}{file}").as_bytes(), &ReadOptions::default(), &|name| {
+                beside(name).map(FileBytes::from)
+            })
+            .unwrap_err()
+            .to_string()
         };
         assert!(refused("ElementDataFile = LIST\ns5.raw").contains("2 needed, 1 left"));
         assert!(refused("ElementDataFile = s%d.raw 5 7 1").contains("16 bytes of samples in 3 files"));

@@ -111,7 +111,7 @@ mod tests {
         # X Y Z\npoints\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nmaterials\n1\n1 steel\nendmesh\n";
 
     fn read_text(text: &str) -> Result<TetMesh, ReadError> {
-        read(text.as_bytes(), &ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 })
+        read(text.as_bytes(), &ReadOptions { cells: CellData::Values, ..ReadOptions::default() })
     }
 
     #[test]

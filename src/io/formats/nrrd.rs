@@ -11,7 +11,7 @@ use crate::io::formats::volume::{
     unpacked, wrong_dimensions,
 };
 use crate::io::number::NumberType;
-use crate::io::{Beside, ReadOptions};
+use crate::io::{Beside, MemoryLimit, ReadOptions};
 use crate::mesh::TetMesh;
 use flate2::read::MultiGzDecoder;
 
@@ -50,7 +50,9 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
     let (header, data) = read_header(bytes).at(|| "header".into())?;
     let volume = header.volume().at(|| "header".into())?;
     let expected = volume.bytes().at(|| "header".into())?;
-    let samples = |data: &[u8], count: usize| header.samples(data, &volume, count);
+    let memory = &options.memory;
+    let _held = memory.hold(expected as u64).at(|| "samples".into())?;
+    let samples = |data: &[u8], count: usize| header.samples(data, &volume, count, memory);
     let samples = if header.files.is_empty() {
         samples(data, expected).at(|| "samples".into())?
     } else {
@@ -323,7 +325,13 @@ impl Header {
     }
 
     /// The `expected` bytes of samples in the data of a file.
-    fn samples(&self, data: &[u8], volume: &Volume, expected: usize) -> Result<Vec<u8>, ReadReason> {
+    fn samples(
+        &self,
+        data: &[u8],
+        volume: &Volume,
+        expected: usize,
+        memory: &MemoryLimit,
+    ) -> Result<Vec<u8>, ReadReason> {
         let mut data = data;
         for _ in 0..self.line_skip {
             let line = data.iter().position(|c| *c == b'\n').map_or(data.len(), |i| i + 1);
@@ -345,6 +353,7 @@ impl Header {
                 // Bytes are skipped behind the compression.
                 let packed = MultiGzDecoder::new(data);
                 if let Ok(skip) = skipped {
+                    memory.expect(skip as u64)?;
                     let all = unpacked(packed, expected.saturating_add(skip))?;
                     return exactly(&all, skip, expected);
                 }
@@ -529,15 +538,16 @@ fn vectors(text: &str) -> Result<Vec<Option<[f64; 3]>>, ReadReason> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::memory::FileBytes;
     use flate2::{Compression, write::GzEncoder};
     use std::io::Write;
 
     fn read_bytes(bytes: &[u8]) -> Result<TetMesh, ReadError> {
         let beside = |name: &str| match name {
-            "a.raw" => Ok((0..8).collect()),
+            "a.raw" => Ok((0..8).collect::<Vec<_>>()),
             other => Err(ReadReason::Io(other.into())),
         };
-        read(bytes, &ReadOptions::default(), &beside)
+        read(bytes, &ReadOptions::default(), &|name| beside(name).map(FileBytes::from))
     }
 
     const HEADER: &str =
@@ -682,7 +692,10 @@ mod tests {
                 let header = format!(
                     "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 3\nencoding: gzip\nbyte skip: {skip}\ndata file: {files}"
                 );
-                let mesh = read(header.as_bytes(), &ReadOptions::default(), &beside).unwrap();
+                let mesh = read(header.as_bytes(), &ReadOptions::default(), &|name| {
+                    beside(name).map(FileBytes::from)
+                })
+                .unwrap();
                 assert!(mesh.fields[0].values.iter().copied().eq((0..12).map(f64::from)), "{header}");
             }
         }

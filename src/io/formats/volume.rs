@@ -97,6 +97,8 @@ impl Volume {
             let (expected, found) = (expected as u64, samples.len() as u64);
             return Err(ReadReason::Count { what: "bytes of samples".into(), expected, found });
         }
+        let numbers = (samples.len() / self.number.size()) as u64;
+        let _held = options.memory.hold(8 * numbers)?;
         let mut fields = Collector::new(options);
         let mut values = Vec::new();
         for array in &self.arrays {
@@ -106,11 +108,12 @@ impl Volume {
                 values = values_first(self.number.floats(samples, self.big), &self.axes);
             }
             let of_array = in_order(&values, self.components() as usize, &array.components);
-            fields.fill(claim, of_array, self.number.is_integer(), &self.unit);
+            fields.fill(claim, of_array, self.number.is_integer(), &self.unit)?;
         }
         let others = [fields.others, Vec::new()];
         let values = GridValues { fields: fields.fields, others, ..GridValues::default() };
-        let mesh = Placement { dims: self.dims, origin: self.origin, steps: self.steps }.mesh(values)?;
+        let mesh = Placement { dims: self.dims, origin: self.origin, steps: self.steps }
+            .mesh(values, &options.memory)?;
         Ok(TetMesh { notes: self.notes.clone(), ..mesh })
     }
 }

@@ -232,7 +232,7 @@ impl Reader<'_> {
         };
         check_finite_cells(&cell_fields, is_there).at(|| place("CellData"))?;
         let numbering = numbers(&positions).at(|| place("Points"))?;
-        let split = listed.map(|listed| listed.split(&numbering)).transpose();
+        let split = listed.map(|listed| listed.split(&numbering, &self.options.memory)).transpose();
         let split = split.at(|| place("Connectivity"))?.unwrap_or_default();
         split.spread(&mut cell_fields);
         let input = MeshInput { other_fields, other_cell_fields, ..split.input };
@@ -246,6 +246,8 @@ impl Reader<'_> {
             let what = "components of the points".into();
             return Err(ReadReason::Count { what, expected: 3, found: length as u64 });
         }
+        let count = piece.points.end.saturating_sub(piece.points.start);
+        self.options.memory.take(count.saturating_mul(24))?;
         Ok(points_from(&floats(&points, piece.points.clone())?))
     }
 
@@ -337,7 +339,7 @@ impl Reader<'_> {
                 continue;
             }
             let values = values(&dataset, components).at(place)?;
-            collector.fill(claim, values, integer, "");
+            collector.fill(claim, values, integer, "").at(place)?;
         }
         Ok([collector.fields, collector.others])
     }
@@ -361,7 +363,9 @@ impl Reader<'_> {
             points: self.grid_ghosts("PointData", whole)?,
             cubes: self.grid_ghosts("CellData", inner)?,
         };
-        placement.mesh(GridValues { fields, cubes, ghosts, others: [others, other_cubes] }).at(place)
+        placement
+            .mesh(GridValues { fields, cubes, ghosts, others: [others, other_cubes] }, &self.options.memory)
+            .at(place)
     }
 
     /// The grid and its extent, as those of a `.vti`.
