@@ -22,6 +22,7 @@ pub fn run(args: &[String]) -> Result<()> {
     shell::run(&mut shell::cargo([
         "publish",
         "--dry-run",
+        "--locked",
         "--package",
         "tetralod",
         "--package",
