@@ -184,6 +184,7 @@ fn js() -> Result<()> {
     package::ensure_built()?;
     shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["lint", "--error-on-warnings"]))?;
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;
+    shell::run(&mut node_test("actions.test.js"))?;
     shell::run(&mut node_test("pack.test.js"))?;
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("fit.test.js"))?;
