@@ -177,6 +177,9 @@ pub fn fill_folder<T>(path: &Path, last: &Path, work: impl FnOnce(&Path) -> Resu
     // In it, so that files are moved within one file system.
     let done = in_folder_beside(&path.join("new"), |folder| {
         let done = work(folder)?;
+        for file in fs::read_dir(folder)? {
+            check_inputs(&path.join(file?.file_name()))?;
+        }
         let _uninterrupted = partial();
         move_all(folder, path, last).with_context(|| format!("{} could not be written", path.display()))?;
         Ok(done)

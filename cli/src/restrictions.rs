@@ -1,6 +1,6 @@
 //! What a build must keep: the options that say so, and what is reported of it.
 
-use super::output;
+use super::{files, output};
 use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -36,6 +36,7 @@ impl RestrictionOptions {
     /// The places of the points that stay.
     pub fn points(&self) -> Result<Vec<[f64; 3]>> {
         let read = |path: &PathBuf| {
+            files::note_inputs(std::slice::from_ref(path));
             let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
             places(path, &text)
         };

@@ -652,7 +652,13 @@ fn inputs_are_never_replaced() {
     good(&["extract", &mt, "-o", &mesh]);
     #[cfg(unix)]
     std::os::unix::fs::symlink(&mt, &linked).expect("a link");
-    let read = || [&input, &mt, &table, &mesh].map(|path| fs::read(path).expect("it is there"));
+    // A file of samples that is called as one in a folder of parts.
+    let [places, plan, samples] = ["places.txt", "plan.json", "plan.raw"].map(|name| folder.path(name));
+    fs::write(&places, "0 0 0\n").expect("a file");
+    fs::write(&plan, "{\"dims\": [4, 4, 4], \"type\": \"uint8\"}").expect("a file");
+    fs::write(&samples, "ABCDEFGH".repeat(8)).expect("a file");
+    let read =
+        || [&input, &mt, &table, &mesh, &places, &plan].map(|path| fs::read(path).expect("it is there"));
     let before = read();
     let renamed = folder.path("m.vtu");
     fs::copy(&mt, &renamed).expect("a copy");
@@ -675,6 +681,8 @@ fn inputs_are_never_replaced() {
         &["extract", &renamed, "-o", &renamed],
         &["extract", &mt, "-o", &mesh, "--measure", &list],
         &["build", &medit, "-o", &solution],
+        &["build", &input, "--keep-points", &places, "-o", &places],
+        &["part", &plan, "--parts", "2", "-o", &folder.path(".")],
         &["probe", &mt, "--points", &table, "-o", &table],
         &["stats", &mt, "--reference", &table, "-o", &table],
     ] {
