@@ -180,6 +180,14 @@ impl InParts {
     /// The values of the whole grid.
     pub fn finish(self, whole: Extent) -> Result<GridValues, ReadReason> {
         let Self { points, cubes, others, names } = self;
+        // Each piece has as many values as it says: nothing else may size what follows.
+        let mut read = 0_usize;
+        for part in &points {
+            read = read.saturating_add(count(part.extent, whole)?);
+        }
+        if read < count(whole, whole)? {
+            return Err(missing());
+        }
         let inner = cubes_of(whole);
         let [at_points, at_cubes] = [assemble_ghosts(&points, whole)?, assemble_ghosts(&cubes, inner)?];
         let ghosts = Ghosts { points: at_points, cubes: at_cubes };
@@ -291,13 +299,21 @@ pub(super) fn dims_in(extent: Extent, whole: Extent) -> Result<[u64; 3], ReadRea
     Ok(dims)
 }
 
+/// How many points, or cubes, a part of a grid has.
+fn count(extent: Extent, whole: Extent) -> Result<usize, ReadReason> {
+    Ok(dims_in(extent, whole)?.map(|d| d as usize).iter().product())
+}
+
+fn missing() -> ReadReason {
+    ReadReason::Missing("a piece of the grid".into())
+}
+
 /// The flags of the whole grid: what is hidden in all pieces that have it. None if no piece has flags.
 fn assemble_ghosts(parts: &[Part], whole: Extent) -> Result<Option<Vec<i64>>, ReadReason> {
     if parts.iter().all(|part| part.ghosts.is_none()) {
         return Ok(None);
     }
-    let whole_dims = dims_in(whole, whole)?.map(|d| d as usize);
-    let mut flags = vec![i64::MAX; whole_dims.iter().product()];
+    let mut flags = vec![i64::MAX; count(whole, whole)?];
     for part in parts {
         each_row(part.extent, whole, &mut |from, to, length| {
             for (i, flag) in flags[to..to + length].iter_mut().enumerate() {
@@ -315,15 +331,11 @@ fn assemble(mut parts: Vec<Part>, whole: Extent) -> Result<Vec<Field>, ReadReaso
     {
         return Ok(std::mem::take(&mut part.fields));
     }
-    let whole_dims = dims_in(whole, whole)?.map(|d| d as usize);
-    let points: usize = whole_dims.iter().product();
     if parts.iter().all(|part| part.fields.is_empty()) {
         return Ok(Vec::new());
     }
-    // Only values that were read may size what follows.
-    let read: usize = parts.iter().filter_map(|p| p.fields.first()).map(|f| f.values.len()).sum();
-    let missing = || ReadReason::Missing("a piece of the grid".into());
-    let first = parts.first().filter(|_| read >= points).ok_or_else(missing)?;
+    let points = count(whole, whole)?;
+    let first = parts.first().ok_or_else(missing)?;
     let mut covered = vec![false; points];
     let empty = |f: &Field| Field {
         values: vec![0.0; points],

@@ -158,6 +158,20 @@ fn grids_without_data_do_not_size_anything() {
                 <Piece Extent=\"0 400 0 400 0 400\"/></ImageData></VTKFile>";
     let error = io::read_bytes("a.vti", file.as_bytes()).unwrap_err();
     assert!(matches!(error.reason, ReadReason::Missing(_)), "{error}");
+    // Neither do values of a small piece, nor no piece at all.
+    let array = |name: &str| {
+        format!("<DataArray type=\"UInt8\" Name=\"{name}\" format=\"ascii\">0 0 0 0 0 0 0 0</DataArray>")
+    };
+    let piece = |data: String| format!("<Piece Extent=\"0 1 0 1 0 1\">{data}</Piece>");
+    for pieces in [
+        piece(format!("<PointData>{}</PointData>", array("vtkGhostType"))),
+        piece(format!("<CellData>{}</CellData>", array("c").replace(" 0 0 0 0 0 0 0", ""))),
+        String::new(),
+    ] {
+        let file = file.replace("<Piece Extent=\"0 400 0 400 0 400\"/>", &pieces);
+        let error = io::read_bytes("a.vti", file.as_bytes()).unwrap_err();
+        assert!(matches!(error.reason, ReadReason::Missing(_)), "{error}");
+    }
     for extent in ["0 9999 0 9999 0 9999", "-9223372036854775808 9223372036854775807 0 1 0 1"] {
         let error =
             io::read_bytes("a.vti", file.replace("0 400 0 400 0 400", extent).as_bytes()).unwrap_err();
