@@ -7,7 +7,6 @@
 mod chart;
 mod figure8;
 mod figures;
-mod greedy;
 mod markdown;
 mod model;
 mod own;
@@ -26,7 +25,6 @@ use tetralod::mesh::TetMesh;
 
 use crate::figure8::Curves;
 use crate::figures::{AtZero, Boxed, Pair};
-use crate::greedy::Needs;
 use crate::model::{DataSet, Recipe};
 use crate::own::Own;
 use crate::table1::Row;
@@ -43,7 +41,6 @@ pub struct Findings {
     pub figure_7: Pair,
     pub uniform: Curves,
     pub variable: Curves,
-    pub needs: Vec<Needs>,
     pub own: Vec<Own>,
     pub boxes: Vec<Boxed>,
     pub at_zero: Vec<AtZero>,
@@ -111,13 +108,12 @@ fn findings(name: &str, mesh: &TetMesh, data: Option<&Path>) -> Result<Findings>
     let boxes = figures::boxes(&bucky)?;
     let uniform = figure8::curves(&bucky, None)?;
     let variable = figure8::curves(&bucky, Some(figure_6.isovalue))?;
-    let needs = greedy::needs(&bucky)?;
     let own = own::own(&bucky)?;
     let at_zero = figures::at_zero(&bucky)?;
     drop(bucky);
     let (missing, scan) = others(data, &mut rows)?;
     let findings =
-        Findings { rows, missing, figure_6, figure_7, uniform, variable, needs, own, boxes, at_zero, scan };
+        Findings { rows, missing, figure_6, figure_7, uniform, variable, own, boxes, at_zero, scan };
     Ok(findings)
 }
 
@@ -191,8 +187,6 @@ mod tests {
             assert!(curves.curves.iter().all(|(_, sizes)| whole(sizes) && sizes.is_sorted_by(|a, b| a >= b)));
             assert!(curves.chart().ends_with("</svg>\n"));
         }
-        let kept = |need: &greedy::Need| need.measured <= need.error + 1e-4;
-        assert!(all.needs.iter().flat_map(|needs| &needs.errors).all(kept));
         for pair in [&all.figure_6, &all.figure_7] {
             assert!(pair.variable.tetrahedra() <= pair.uniform.tetrahedra());
         }

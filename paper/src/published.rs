@@ -71,12 +71,5 @@ pub const FIGURE_7: Caption = Caption {
 pub const FIGURE_8_ERRORS: [f64; 6] = [0.0, 0.001, 0.005, 0.01, 0.05, 0.1];
 /// How many fewer tetrahedra the vertex-based MT needs than the edge-based one: uniform, and by field value.
 pub const FIGURE_8_SAVED: [f64; 2] = [0.08, 0.20];
-/// How many fewer half-edge collapses need than full-edge collapses, in the literature.
+/// How many fewer tetrahedra half-edge collapses need than general edge collapses, on average: the abstract of *The half-edge tree*.
 pub const HALF_EDGE_SAVED: f64 = 0.34;
-
-/// Tetrahedra of plain greedy Delaunay insertion on the generated bucky ball of 33³ points, by the error at which it
-/// stops; measured elsewhere, without any MT.
-pub const GREEDY: [(f64, u64); 3] = [(0.05, 24_197), (0.01, 72_938), (0.002, 99_665)];
-/// What VTK's decimation of unstructured grids needs there: about so many tetrahedra for so much error, measured
-/// elsewhere.
-pub const VTK: (f64, u64) = (0.045, 49_000);

@@ -1,8 +1,6 @@
 //! Meshes out of an MT, and what is counted on them.
 
 use anyhow::{Context, Result, ensure};
-use tetralod::measure::{Part, Reference, deviation};
-use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MultiTessellation};
 use tetralod::refine::{Front, LodCriterion, Request};
 use tetralod::view::{IsoSurface, MeshView};
@@ -62,12 +60,4 @@ impl Shown {
         surface.extract(&self.view(), isovalue);
         surface.indices.len() as u64
     }
-}
-
-/// The largest error at the vertices of `reference`, measured, as a fraction of the field's range.
-pub fn measured(mt: &Mt, front: &Front, reference: &TetMesh) -> Result<f64> {
-    let field = mt.info().fields.first().context("an MT has a field")?;
-    let values = reference.fields.iter().find(|f| f.name == field.name).context("a field of the mesh")?;
-    let reference = Reference { positions: &reference.positions, values: &values.values, field: 0 };
-    Ok(deviation(mt.info(), front.mesh(), &reference, &Part::default()).field / field.range())
 }

@@ -5,11 +5,10 @@ use crate::figures::Pair;
 use crate::markdown::{count, fewer, percent};
 use crate::model::Recipe;
 use crate::own::Own;
-use crate::{Findings, Scan, figures, greedy, own, published, table1};
+use crate::{Findings, Scan, figures, own, published, table1};
 
 pub fn page(all: &Findings) -> String {
-    let parts =
-        [INTRODUCTION.to_owned(), table_1(all), figure_6(all), figure_7(all), figure_8(all), beyond(all)];
+    let parts = [INTRODUCTION.to_owned(), table_1(all), figure_6(all), figure_7(all), figure_8(all)];
     parts.into_iter().chain(all.scan.as_ref().map(scan)).collect::<Vec<_>>().join("\n")
 }
 
@@ -19,9 +18,8 @@ const INTRODUCTION: &str = "\
 *Written by `cargo xtask paper`: change the command, not this page.*
 
 The paper is E. Danovaro, L. De Floriani, P. Magillo, E. Puppo, *Data Structures for 3D Multi-Tessellations: an \
-Overview* (2003); what follows is its section 6. Its numbers are set in *italics*. Rows marked *elsewhere* are \
-constants: what other programs were measured to need. Everything else is computed by the command, from the library as it is, \
-and is the same on every run and machine (but for the pictures, which depend on the GPU).
+Overview* (2003); what follows is its section 6. Its numbers are set in *italics*. \
+Everything else is computed by the command, from the library as it is, and is the same on every run and machine (but for the pictures, which depend on the GPU).
 
 What differs from the paper before anything is built:
 
@@ -249,8 +247,9 @@ edge-based one. Here, compared with the edge-based MT of the same reference mesh
 - insertion needs {insert};
 - insertion with errors of the tetrahedra's own needs {own}.
 
-The literature has half-edge collapses at {literature} than full-edge ones, without midpoints; our edge collapses put \
-the new vertex at the midpoint, as the paper's do.
+E. Danovaro et al., *The half-edge tree: a compact data structure for level-of-detail tetrahedral meshes* (Shape Modeling \
+International 2005), have {literature} by half-edge collapses than by general edge collapses, on average; our edge collapses \
+put the new vertex at the midpoint, as the paper's do.
 
 {why}",
         half = both(Recipe::HalfEdge),
@@ -292,23 +291,6 @@ paper does print for its inserted MT (at 0.1 %) are near to ours.
         half_for_others = count(half_for_others),
         half_needed = count(half_needed),
         table = own::table(all),
-    )
-}
-
-fn beyond(all: &Findings) -> String {
-    format!(
-        "\
-## Beside programs that make one mesh
-
-Tetrahedra at uniform errors, with the error that was measured at all reference vertices in brackets. The first two \
-rows were measured elsewhere, on the same generated field: plain greedy Delaunay insertion stops at the error and has no \
-MT to show for it.
-
-{}
-A greedy mesh is good at the moment at which it stops; the MT by insertion has to keep its error in every consistent set \
-that a request may lead to, and pays as told above. Decimated MTs pay little for being MTs.
-",
-        greedy::table(&all.needs)
     )
 }
 
