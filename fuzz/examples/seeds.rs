@@ -83,7 +83,11 @@ const OTHER_FORMATS: [(&str, &str); 10] = [
     ("a.mha", "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\nABCDEFGH"),
 ];
 
-/// Small meshes in every format that is read.
+/// Files of other programs: HDF5, netCDF and LZMA.
+const FILES: [&str; 6] =
+    ["image.vtkhdf", "pieces.vtkhdf", "steps.vtkhdf", "netcdf4.exo", "many_ways.exo", "lzma.vtu"];
+
+/// Small meshes in most of the formats that are read.
 fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     let mesh = by_name("bucky", 3)?;
     let mut files = Vec::new();
@@ -110,6 +114,10 @@ fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     files.push(("plain.vtu".into(), plain.into()));
     let sidecar = "{\"dims\": [2, 2, 2], \"type\": \"uint8\", \"endian\": \"little\", \"spacing\": [1, 1, 1], \"origin\": [0, 0, 0], \"field\": \"p\"}\0abcdefgh";
     files.push(("samples.raw".into(), sidecar.into()));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data");
+    for name in FILES {
+        files.push((name.into(), fs::read(folder.join(name))?));
+    }
     files.extend(OTHER_FORMATS.map(|(name, content)| (name.to_owned(), content.into())));
     Ok(files)
 }

@@ -196,6 +196,7 @@ fn ask(session: &mut Session, byte: u8) {
 pub fn import(input: &[u8]) {
     let options = io::ReadOptions { cells: io::CellData::Values, ..io::ReadOptions::default() };
     let _ = io::read_bytes_with("input", input, &options);
+    let _ = io::survey("input", input);
     if let Some(at) = input.iter().position(|&byte| byte == 0) {
         let _ = io::read_raw("input.json", &input[..at], &input[at + 1..]);
     }
