@@ -1,5 +1,6 @@
 //! `cargo xtask test`: every check there is, in order of cost. Each step prints a header and its time; the first that
-//! fails ends the run, and none is left out because something is missing on the machine.
+//! fails ends the run. No step is left out because something is missing on the machine; tests in it may be, and say so (see
+//! CONTRIBUTING.md), unless a variable such as `TETRALOD_NEED_GPU` makes that a failure.
 //!
 //! A feature set of its own compiles the crate and what it needs again. So lints, documentation, tests and the command that
 //! makes the tests' data share one ([`shell::ALL`]); further ones are only linted, and only where a mistake would not show in it.
