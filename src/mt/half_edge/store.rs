@@ -1,4 +1,5 @@
-//! The compact half-edge Multi-Tessellation: vertex insertions whose inverse collapses a vertex onto a neighbour.
+//! The compact half-edge Multi-Tessellation: vertex insertions whose inverse collapses a vertex onto a neighbour. The paper has such
+//! collapses as a criterion of vertex-based MTs [§2.2], not this structure.
 //!
 //! Update `k` inserts vertex `b + k`, where `b` is the number of base vertices. Its *near vertex* is the one that the
 //! inverse collapses it onto. All tetrahedra that `u+` removes (T_u, [§5]) have the near vertex, so the insertion moves
