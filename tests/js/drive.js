@@ -62,7 +62,15 @@ export async function picture(page, name) {
   await settle(page);
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
   const style = "#legend, #loading, #growth, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
-  return study(page, await page.locator("#canvas").screenshot({ path, style }));
+  // As an element it would be refused by the page's policy.
+  await page.evaluate((style) => {
+    const sheet = new CSSStyleSheet();
+    sheet.replaceSync(style);
+    document.adoptedStyleSheets = [sheet];
+  }, style);
+  const png = await page.locator("#canvas").screenshot({ path });
+  await page.evaluate(() => (document.adoptedStyleSheets = []));
+  return study(page, png);
 }
 
 /**

@@ -194,6 +194,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("writers.test.js"))?;
     shell::run(&mut node_test("tools.test.js"))?;
     shell::run(&mut node_test("bins.test.js"))?;
+    shell::run(&mut node_test("policy.test.js"))?;
     with_fixture(|| {
         for name in [
             "package.test.js",
