@@ -1,26 +1,14 @@
 //! Promise: the boundary is within its bound at the places that the documentation names, between vertices too; and verification looks there.
 
-use crate::support::meshes::{blocks, linear};
+use crate::support::meshes::sheet;
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, build};
-use tetralod::mesh::{TetMesh, repair};
+use tetralod::mesh::TetMesh;
 use tetralod::mt::{
     ApplyUpdates, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtKind, MultiTessellation, UpdateId, VertexId,
 };
 use tetralod::refine::Request;
 use tetralod::verify::{self, Reference, VerifyReport};
-
-/// A sheet around half of a cylinder of radius 1: a chord of it soon leaves it.
-fn sheet(thickness: f64) -> TetMesh {
-    let mut mesh = blocks([48, 16, 2], &[linear], |_| true);
-    mesh.grid = None;
-    for p in &mut mesh.positions {
-        let [u, v, w] = *p;
-        let (radius, turn) = (1.0 + thickness * w, std::f64::consts::PI * u);
-        *p = [radius * turn.cos(), radius * turn.sin(), v];
-    }
-    repair(mesh).expect("a bent sheet").0
-}
 
 fn built(mesh: &TetMesh, kind: MtKind) -> Mt {
     let config = BuildConfig { fields: vec!["f0".into()], ..BuildConfig::of(kind) };

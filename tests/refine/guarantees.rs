@@ -9,7 +9,9 @@ use crate::support::conformance::{
 };
 use crate::support::data::real_data;
 use crate::support::surfaces::{Interpolant, Mesh, Surface};
-use glam::DVec3;
+use glam::{DMat4, DVec3, DVec4};
+use std::collections::BTreeMap;
+use tetralod::builder::Method;
 use tetralod::geom::Bounds;
 use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::{ApplyUpdates, ExplicitMt, Mt, MultiTessellation, UpdateId, VertexId};
@@ -155,6 +157,99 @@ fn nothing_outside_of_a_region_is_asked_for() {
                 assert!(near, "{name}: {u:?} is far away");
             }
         }
+    }
+}
+
+/// The same of a view: what is beyond one side of the picture, or too small in it, by plain geometry.
+#[test]
+fn nothing_outside_of_a_view_is_asked_for() {
+    let (viewport, pixels) = ([900.0, 600.0], 2.0);
+    for (name, how) in KINDS {
+        let mut left_out = [0; 4];
+        for input in inputs() {
+            let Some(subject) = Subject::new(how, input) else { continue };
+            let (explicit, info) = (&subject.explicit, subject.mt.info());
+            let whole = Bounds::of(&subject.input.mesh.positions);
+            let size = whole.diagonal();
+            let middle = (DVec3::from(whole.min) + DVec3::from(whole.max)) / 2.0;
+            let eye = middle + size * DVec3::new(0.1, -0.3, 0.2);
+            let ways = [[0.6, 1.0, 0.4], [-0.6, 1.0, -0.4], [0.3, 1.0, -1.2], [-0.3, 1.0, 0.9]];
+            for camera in ways.map(|way| view(eye, DVec3::from(way), viewport)) {
+                let criterion = LodCriterion::new(info, &Need::seen(camera.clone(), pixels).into());
+                let asked = asked(explicit, &criterion);
+                let matrix = DMat4::from_cols_array(&camera.matrix);
+                let [x, y, w] = [0, 1, 3].map(|i| matrix.row(i));
+                let sides = [w + x, w - x, w + y, w - y];
+                for u in (0..explicit.updates()).map(UpdateId) {
+                    let length = explicit.error(u).error() * info.displacement_per_error;
+                    let margin = length + 1e-9 * size;
+                    let corners = explicit.removed(u).iter().map(|&t| {
+                        explicit.tets()[t as usize]
+                            .map(|v| DVec3::from(info.lattice.point(explicit.position(VertexId(v)))))
+                    });
+                    let is_beyond = |side: &DVec4| {
+                        let away = |p: &DVec3| -(side.truncate().dot(*p) + side.w) / side.truncate().length();
+                        corners.clone().flatten().all(|p| away(&p) > margin)
+                    };
+                    let beyond = sides.each_ref().map(is_beyond);
+                    left_out.iter_mut().zip(beyond).for_each(|(count, beyond)| *count += i32::from(beyond));
+                    assert!(
+                        !asked[u.0 as usize] || beyond == [false; 4],
+                        "{name}: {u:?} is beyond {beyond:?}"
+                    );
+                    // At the depth of its nearest corner, less the margin, which is at least half of that depth.
+                    let depth =
+                        corners.flatten().map(|p| w.truncate().dot(p) + w.w).fold(f64::INFINITY, f64::min);
+                    let largest = 1.5 * viewport[0] * length / (depth - margin);
+                    if depth > 2.0 * margin && largest < pixels {
+                        assert!(!asked[u.0 as usize], "{name}: {u:?} looks like {largest} pixels");
+                    }
+                }
+            }
+        }
+        assert!(left_out.iter().all(|count| *count > 50), "{name}: {left_out:?}");
+    }
+}
+
+/// Values are stored as levels. A range that begins just within reach of the value before it was rounded to one counts.
+#[test]
+fn values_between_levels_are_not_missed() {
+    for (name, how) in KINDS.into_iter().filter(|(_, how)| how.method != Method::Collapse) {
+        let mut rounded_down = 0;
+        for input in inputs() {
+            let Some(subject) = Subject::new(how, input) else { continue };
+            let (explicit, info) = (&subject.explicit, subject.mt.info());
+            let (mesh, field) = (&subject.input.mesh, &info.fields[0]);
+            let nearest = mesh.positions.iter().map(|&p| info.lattice.nearest(p));
+            let values: BTreeMap<_, f64> = nearest.zip(mesh.fields[0].values.iter().copied()).collect();
+            for u in (0..explicit.updates()).step_by(5).map(UpdateId) {
+                let (error, errors) = (explicit.error(u), explicit.errors(u));
+                for &t in explicit.removed(u) {
+                    let tet = explicit.tets()[t as usize].map(VertexId);
+                    let corners = tet.map(|v| explicit.position(v));
+                    let Some(highest) = corners
+                        .iter()
+                        .map(|p| values.get(p))
+                        .try_fold(f64::MIN, |high, value| value.map(|v| high.max(*v)))
+                    else {
+                        continue;
+                    };
+                    let level = tet.map(|v| explicit.levels(v)[0]).into_iter().max().expect("four corners");
+                    rounded_down += i32::from(field.value(level) < highest);
+                    let reach = highest + errors[0].error() * field.range();
+                    let levels = |field: usize| tet.map(|v| explicit.levels(v)[field]);
+                    let look = TetData { corners: &corners, levels: &levels, error, errors, update: u };
+                    let judged = |low: f64| {
+                        let need = Need::within(0.0).between(0, vec![[low, f64::MAX]]);
+                        LodCriterion::new(info, &need.into()).judge(&look).violates()
+                    };
+                    assert!(judged(reach - 1e-9 * field.range()), "{name}: {u:?} reaches {reach}");
+                    let step = field.value(1) - field.value(0);
+                    assert!(!judged(reach + 1.1 * step), "{name}: {u:?} does not reach more than {reach}");
+                }
+            }
+        }
+        assert!(rounded_down > 100, "{name}: {rounded_down}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Promises of selective refinement: what a request gives, and how large its error is.
 
 mod at_vertices;
+mod bounds;
 mod cameras;
 mod fields;
 mod guarantees;

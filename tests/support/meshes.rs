@@ -58,6 +58,18 @@ pub fn bent(n: u32) -> TetMesh {
     repair(mesh).expect("a bent cube").0
 }
 
+/// A sheet around half of a cylinder of radius 1: a chord of it soon leaves it.
+pub fn sheet(thickness: f64) -> TetMesh {
+    let mut mesh = blocks([48, 16, 2], &[linear], |_| true);
+    mesh.grid = None;
+    for p in &mut mesh.positions {
+        let [u, v, w] = *p;
+        let (radius, turn) = (1.0 + thickness * w, std::f64::consts::PI * u);
+        *p = [radius * turn.cos(), radius * turn.sin(), v];
+    }
+    repair(mesh).expect("a bent sheet").0
+}
+
 /// Builds with all fields.
 pub fn built(mesh: &TetMesh) -> BuildResult<EdgeMt> {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
