@@ -528,8 +528,8 @@ export class MultiTessellation extends WithMeshTools {
   [Symbol.dispose](): void;
 }
 
-/** Which surface `tetralod/three` and `tetralod/vtk` show: one of these. */
-export type SurfaceOptions =
+/** Which surface `tetralod/three` and `tetralod/vtk` show: one of these, with fields beside the values that are drawn. */
+export type SurfaceOptions = FieldOptions & (
   | {
       /** At one value or several, in units of the field. */
       isosurface: number | ArrayLike<number>;
@@ -543,7 +543,8 @@ export type SurfaceOptions =
   | {
       /** The boundary of the mesh. */
       boundary: true;
-    };
+    }
+);
 
 /** The codes of errors, for programs. */
 export type ErrorCode =

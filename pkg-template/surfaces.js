@@ -8,15 +8,16 @@ const KINDS = ["isosurface", "slice", "boundary"];
 
 /** The triangles that `what` asks for. */
 async function extract(volume, what) {
-  checkNames(what, [...KINDS, "normals"]);
-  const { isosurface, slice, boundary, normals } = what;
+  checkNames(what, [...KINDS, "normals", "fields"]);
+  const { isosurface, slice, boundary, normals, fields } = what;
   const asked = [isosurface !== undefined, slice !== undefined, Boolean(boundary)];
   if (asked.filter(Boolean).length !== 1) {
     throw new TetralodError("bad-option", `one of ${KINDS.join(", ")} is needed, and no second one`);
   }
-  if (boundary) return volume.surface();
-  if (slice !== undefined) return volume.slice(slice?.normal, slice?.offset);
-  return volume.isosurface(isosurface, normals === undefined ? {} : { normals });
+  const how = fields === undefined ? {} : { fields };
+  if (boundary) return volume.surface(how);
+  if (slice !== undefined) return volume.slice(slice?.normal, slice?.offset, how);
+  return volume.isosurface(isosurface, normals === undefined ? how : { ...how, normals });
 }
 
 /** What keeps `take` supplied: later updates replace those that wait. */
@@ -30,7 +31,7 @@ export class Surface {
   /**
    * @param {import("./index.js").MeshTools} volume
    * @param {object} what
-   * @param {(triangles: any) => void} take gets positions, indices, and where there are any normals and values
+   * @param {(triangles: any) => void} take gets positions, indices, and where there are any normals, values and fields
    */
   constructor(volume, what, take) {
     this.#volume = volume;

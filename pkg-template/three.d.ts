@@ -15,7 +15,7 @@
  */
 
 import type { BufferGeometry } from "three";
-import type { MeshTools, SurfaceOptions } from "./index.js";
+import type { FieldValues, MeshTools, SurfaceOptions } from "./index.js";
 
 export type { SurfaceOptions };
 
@@ -23,7 +23,7 @@ export type { SurfaceOptions };
 export interface ThreeSurface {
   /**
    * Always the same object. Its attributes are `position` (relative to `origin`), `normal` (of isosurfaces; others want `flatShading`),
-   * `value` (relative to `offset`) and, with the option `color`, `color`. They are longer than what is drawn: the draw range and the bounding box
+   * `value` (relative to `offset`), with the option `color`, `color`, and `field0`, `field1`, … of `fields`. They are longer than what is drawn: the draw range and the bounding box
    * and sphere are set.
    */
   readonly geometry: BufferGeometry;
@@ -35,6 +35,11 @@ export interface ThreeSurface {
   /** What the attribute `value` is relative to: a value is `offset + scale * v`, in field units. 0 and 1 unless the field needs it. */
   readonly offset: number;
   readonly scale: number;
+  /**
+   * The fields that `what` asked for (`fields`), in its order: each is the attribute of this name, of one number a vertex, and a value is
+   * `offset + scale * v` in its own units. Empty if none were asked for.
+   */
+  readonly fields: readonly (Omit<FieldValues, "values"> & { attribute: string })[];
   /**
    * Extracts the surface from the mesh as it is now, and writes it into `geometry`. Where arrays are too short, it replaces
    * them. `what` asks for another surface, now and later. Of calls that are faster than the worker, the last one counts.

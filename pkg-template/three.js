@@ -31,6 +31,8 @@ class ThreeSurface {
   /** What the attribute `value` is relative to. */
   offset = 0;
   scale = 1;
+  /** What is known of each field that was asked for, and the name of its attribute. */
+  fields = [];
 
   async update(what) {
     await this.#surface.update(what);
@@ -46,9 +48,19 @@ class ThreeSurface {
     this.dispose();
   }
 
-  #take({ positions, indices, normals, values, origin, offset, scale }) {
+  #take({ positions, indices, normals, values, origin, offset, scale, fields = [] }) {
+    const before = this.fields.map(({ attribute }) => [attribute, [undefined, 1]]);
     Object.assign(this, { origin, offset, scale });
-    const arrays = { position: [positions, 3], normal: [normals, 3], value: [values, 1], color: [this.#colors(values), 3], index: [indices, 1] };
+    this.fields = fields.map(({ values, ...field }, i) => ({ ...field, attribute: `field${i}` }));
+    const arrays = {
+      position: [positions, 3],
+      normal: [normals, 3],
+      value: [values, 1],
+      color: [this.#colors(values), 3],
+      ...Object.fromEntries(before),
+      ...Object.fromEntries(fields.map(({ values }, i) => [`field${i}`, [values, 1]])),
+      index: [indices, 1],
+    };
     if (!Object.entries(arrays).every(([name, [array]]) => this.#fits(name, array))) this.#replace(arrays);
     for (const [name, [array]] of Object.entries(arrays)) {
       const attribute = this.#attribute(name);

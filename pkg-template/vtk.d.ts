@@ -22,7 +22,7 @@ export type { SurfaceOptions };
 /** Polydata that show a surface of the current mesh. */
 export interface VtkSurface {
   /**
-   * Always the same object: points, triangles, the values as scalars, and normals of isosurfaces. Points and values are absolute: in double
+   * Always the same object: points, triangles, the values as scalars, normals of isosurfaces, and the fields that `what` asks for (`fields`) as arrays of their names. Points and values are absolute: in double
    * precision where single precision would lose digits of the volume.
    */
   readonly polyData: vtkPolyData;
@@ -41,7 +41,7 @@ export interface VtkSurface {
 export interface VtkOptions {
   /** Classes of vtk.js, for a page that has loaded it in its own way. Default: they are imported from `@kitware/vtk.js`. */
   vtk?: { vtkPolyData: { newInstance(): any }; vtkDataArray: { newInstance(initial?: object): any } };
-  /** The name of the array of scalars. Default: `field`. */
+  /** The name of the array of scalars, which no field that is asked for may have. Default: `field`. */
   name?: string;
 }
 

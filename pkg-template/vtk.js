@@ -1,5 +1,6 @@
 /** Surfaces of a volume as a `vtkPolyData` of vtk.js, which is updated in place. */
 
+import { TetralodError } from "./errors.js";
 import { absolute } from "./stored.js";
 import { Surface } from "./surfaces.js";
 import { checkNames } from "./tools.js";
@@ -24,6 +25,8 @@ class VtkSurface {
   #vtk;
   #name;
   #surface;
+  /** The names of the fields that are there beside the scalars. */
+  #fields = [];
 
   constructor(volume, what, vtk, name) {
     this.#vtk = vtk;
@@ -48,12 +51,21 @@ class VtkSurface {
 
   #take(triangles) {
     const { polyData } = this;
-    const { positions, indices, normals, values } = absolute(triangles);
+    const { positions, indices, normals, values, fields = [] } = absolute(triangles);
+    const taken = fields.find(({ name }) => [this.#name, "Normals"].includes(name));
+    if (taken) throw new TetralodError("bad-option", `option \`name\`: there is a field ${taken.name}; give the scalars another name`);
     polyData.getPoints().setData(positions, 3);
     polyData.getPolys().setData(cellsOf(indices), 1);
     const data = polyData.getPointData();
     this.#put(data, "Scalars", this.#name, values, 1);
     this.#put(data, "Normals", "Normals", normals, 3);
+    this.#fields.filter((name) => fields.every((field) => field.name !== name)).forEach((name) => data.removeArray(name));
+    this.#fields = fields.map(({ name }) => name);
+    for (const { name, values } of fields) {
+      const there = data.getArrayByName(name);
+      if (there) there.setData(values, 1);
+      else data.addArray(this.#vtk.vtkDataArray.newInstance({ name, values }));
+    }
     polyData.modified();
   }
 

@@ -75,6 +75,7 @@ class BufferGeometry {
   attributes = {};
   index = null;
   getAttribute = (name) => this.attributes[name];
+  hasAttribute = (name) => name in this.attributes;
   setAttribute = (name, attribute) => (this.attributes[name] = attribute);
   deleteAttribute = (name) => delete this.attributes[name];
   setIndex = (attribute) => (this.index = attribute);
@@ -106,6 +107,59 @@ test("three.js gets positions relative to an origin, and colours of absolute val
   assert.deepEqual([surface.origin, surface.offset, surface.scale], [FAR.origin, FAR.offset, FAR.scale]);
   assert.deepEqual([...surface.geometry.getAttribute("position").array], [...triangle.positions]);
   assert.deepEqual(seen, values);
+});
+
+/** Fields of the triangle as surfaces have them. */
+const beside = [
+  { index: 1, name: "p", offset: 100, scale: 2, values: Float32Array.of(1, 2, 3) },
+  { index: 2, name: "q", offset: 0, scale: 1, values: Float32Array.of(4, 5, 6) },
+];
+
+test("three.js gets an attribute for each field that is asked for, and none of one that no longer is", async () => {
+  const asked = [];
+  const volume = {
+    surface: async (how) => {
+      asked.push(how);
+      return { ...triangle, ...FAR, fields: beside.slice(0, how.fields?.length ?? 0) };
+    },
+  };
+  const surface = await createThreeSurface(/** @type {any} */ (volume), { boundary: true, fields: ["p", "q"] }, { three: /** @type {any} */ (three) });
+  // Arrays that take the place of others have room for more.
+  const values = (name) => surface.geometry.hasAttribute(name) && [...surface.geometry.getAttribute(name).array.subarray(0, 3)];
+  assert.deepEqual(surface.fields.map(({ name, attribute, offset, scale }) => [name, attribute, offset, scale]), [["p", "field0", 100, 2], ["q", "field1", 0, 1]]);
+  assert.deepEqual([values("field0"), values("field1")], [[1, 2, 3], [4, 5, 6]]);
+  await surface.update({ boundary: true, fields: ["p"] });
+  assert.deepEqual([values("field0"), values("field1")], [[1, 2, 3], false]);
+  await surface.update({ boundary: true });
+  assert.deepEqual([surface.fields, values("field0")], [[], false]);
+  assert.deepEqual(asked, [{ fields: ["p", "q"] }, { fields: ["p"] }, {}]);
+});
+
+test("vtk.js gets an array for each field that is asked for, in absolute numbers", async () => {
+  const arrays = new Map();
+  const newInstance = ({ name, values }) => ({ getName: () => name, getData: () => values, setData: (next) => (values = next) });
+  const scalars = newInstance({ name: "field", values: [] });
+  const data = {
+    getScalars: () => scalars,
+    getNormals: () => scalars,
+    getArrayByName: (name) => arrays.get(name) ?? null,
+    addArray: (array) => arrays.set(array.getName(), array),
+    removeArray: (name) => arrays.delete(name),
+  };
+  const put = { setData() {} };
+  const polyData = { getPoints: () => put, getPolys: () => put, getPointData: () => data, modified() {} };
+  const vtk = { vtkPolyData: { newInstance: () => polyData }, vtkDataArray: { newInstance } };
+  const volume = { slice: async (_normal, _offset, how) => ({ ...triangle, ...FAR, fields: beside.slice(0, how.fields?.length ?? 0) }) };
+  const slice = { normal: [0, 0, 1], offset: 0 };
+  const surface = await createVtkSurface(/** @type {any} */ (volume), { slice, fields: ["p", "q"] }, { vtk });
+  const found = () => Object.fromEntries([...arrays].map(([name, array]) => [name, [...array.getData()]]));
+  assert.deepEqual(found(), { p: [102, 104, 106], q: [4, 5, 6] });
+  await surface.update({ slice, fields: ["p"] });
+  assert.deepEqual(found(), { p: [102, 104, 106] });
+  await surface.update({ slice });
+  assert.deepEqual(found(), {});
+  const named = createVtkSurface(/** @type {any} */ (volume), { slice, fields: ["p"] }, { vtk, name: "p" });
+  await assert.rejects(named, { code: "bad-option", message: /a field p; give the scalars another name/ });
 });
 
 test("vtk.js gets absolute numbers in double precision", async () => {
