@@ -117,7 +117,7 @@ fn cameras_around_and_inside_of_small_meshes() {
 fn cameras_around_a_ball() {
     let mesh = generate::by_name("bucky", 13).expect("a known volume");
     for (kind, how) in [("half-edge", PAGED), ("edge", EDGE)] {
-        follows(&format!("bucky, {kind}"), &how.build(&mesh, None), &mesh, 250, 5);
+        follows(&format!("bucky, {kind}"), &how.build(&mesh, None), &mesh, 100, 5);
     }
 }
 
@@ -129,7 +129,7 @@ fn cameras_around_real_meshes() {
         let mut mesh = repair(mesh).expect("a mesh that can be repaired").0;
         mesh.fields.truncate(2);
         for (kind, how) in [("half-edge", PAGED), ("edge", EDGE)] {
-            follows(&format!("{name}, {kind}"), &how.build(&mesh, None), &mesh, 150, 7);
+            follows(&format!("{name}, {kind}"), &how.build(&mesh, None), &mesh, 60, 7);
         }
     }
 }
