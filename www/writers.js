@@ -1,7 +1,7 @@
 /** Meshes and triangles as files that other programs read. Each gives the parts of a file, one after the other. */
 
 /** @typedef {Float32Array | Float64Array} Numbers */
-/** @typedef {Pick<import("tetralod").FieldValues, "index" | "name" | "time" | "vector"> & { values: Numbers }} Field */
+/** @typedef {Pick<import("tetralod").FieldValues, "index" | "name" | "unit" | "time" | "vector"> & { values: Numbers }} Field */
 /** @typedef {{ positions: Numbers, fields: Field[], tets: Uint32Array }} TetMesh in absolute numbers */
 /** @typedef {{ positions: Numbers, fields: Field[], indices: Uint32Array, normals?: Float32Array }} Surface in absolute numbers */
 /**
@@ -97,20 +97,24 @@ export function vtu({ positions, tets, fields }, shown) {
   const [points, cells] = [positions.length / 3, tets.length / 4];
   const appended = [];
   let offset = 0;
-  const array = (data, name, size = 1) => {
+  const array = (data, name, size = 1, unit = "") => {
     const type = data.constructor.name.replace("Array", "").replace("Uint", "UInt");
-    const element = `<DataArray type="${type}" Name="${escaped(name)}" NumberOfComponents="${size}" format="appended" offset="${offset}"/>`;
+    const element = `<DataArray type="${type}" Name="${escaped(name)}" NumberOfComponents="${size}" format="appended" offset="${offset}"`;
+    const key = unit && `<InformationKey name="UNITS_LABEL" location="vtkDataArray">${escaped(unit)}</InformationKey>`;
     appended.push(BigUint64Array.of(BigInt(data.byteLength)), data);
     offset += 8 + data.byteLength;
-    return element;
+    return key ? `${element}>${key}</DataArray>` : `${element}/>`;
   };
   const arrays = arraysOf(fields);
+  // The one of all fields; several are in their names.
+  const time = fields.every((field) => field.time === fields[0].time) ? fields[0]?.time : undefined;
+  const when = time === undefined ? "" : `<FieldData><DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">${time}</DataArray></FieldData>\n`;
   const scalars = arrayOf(arrays, shown);
   const ends = Uint32Array.from({ length: cells }, (_, i) => 4 * (i + 1));
   const head = `<?xml version="1.0"?>
 <VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">
-<UnstructuredGrid><Piece NumberOfPoints="${points}" NumberOfCells="${cells}">
-<PointData${scalars ? ` Scalars="${escaped(scalars.name)}"` : ""}>${arrays.map(({ values, name, size }) => array(values, name, size)).join("")}</PointData>
+<UnstructuredGrid>${when}<Piece NumberOfPoints="${points}" NumberOfCells="${cells}">
+<PointData${scalars ? ` Scalars="${escaped(scalars.name)}"` : ""}>${arrays.map(({ values, name, size, field }) => array(values, name, size, field.unit)).join("")}</PointData>
 <Points>${array(positions, "Points", 3)}</Points>
 <Cells>${array(tets, "connectivity")}${array(ends, "offsets")}${array(new Uint8Array(cells).fill(TETRAHEDRON), "types")}</Cells>
 </Piece></UnstructuredGrid>

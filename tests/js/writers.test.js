@@ -5,7 +5,7 @@ import { absolute } from "../../pkg-template/stored.js";
 import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "../../www/writers.js";
 
 /** @type {Omit<import("../../www/writers.js").Field, "index" | "values">} */
-const scalar = { name: "the density", time: undefined, vector: undefined };
+const scalar = { name: "the density", unit: "", time: undefined, vector: undefined };
 const fieldsOf = (count, ...all) =>
   all.map((one, index) => ({ ...scalar, ...one, index, offset: 0, scale: 1, values: Float32Array.from({ length: count }, (_, i) => index + i / 4) }));
 const plainly = { origin: [0, 0, 0], offset: 0, scale: 1 };
@@ -56,6 +56,16 @@ test("VTU: appended arrays are where the offsets say", async () => {
   assert.deepEqual(read(array("offsets"), 0, 2, "UInt32LE"), [4, 8]);
   assert.deepEqual([...array("types")], [10, 10]);
   assert.ok(text.endsWith("</AppendedData></VTKFile>\n"));
+});
+
+test("VTU: units and the time of all fields are told as VTK does", async () => {
+  const of = async (...fields) => (await bytesOf(vtu({ ...mesh, fields: fieldsOf(5, ...fields) }, 0))).toString("latin1");
+  const both = await of({ name: "p", unit: "kg/(m<s>)", time: 0.25 }, { name: "q", time: 0.25 });
+  assert.match(both, /Name="p"[^>]*><InformationKey name="UNITS_LABEL" location="vtkDataArray">kg\/\(m&#60;s&#62;\)<\/InformationKey><\/DataArray>/);
+  assert.match(both, /Name="q"[^>]*\/>/);
+  assert.match(both, /<FieldData><DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">0.25<\/DataArray><\/FieldData>/);
+  assert.doesNotMatch(await of({ name: "p", time: 0.25 }, { name: "p", time: 0.5 }), /TimeValue/);
+  assert.doesNotMatch(await of({ name: "p" }), /TimeValue|UNITS/);
 });
 
 test("legacy VTK: numbers have the highest byte first", async () => {
