@@ -253,6 +253,9 @@ struct Report {
     /// With a bound for them.
     #[serde(skip_serializing_if = "Option::is_none")]
     angles: Option<Angles>,
+    /// What the reader left out of the input or changed, in words.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notes: Vec<String>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -285,6 +288,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (mesh, repaired) = input::mend(mesh, level, &options.inputs[0])?;
     }
     let repair = options.repair_of(&mesh, &repaired, way, verbosity)?;
+    let notes = mesh.notes.clone();
     let mut angles = config.min_dihedral.map(|_| Angles::of_reference(&mesh));
     let result = match way {
         Way::Whole => build(arguments, &config, mesh)?,
@@ -301,7 +305,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         arguments,
         &config,
         (result, start),
-        Report { repair, angles, ..repaired_as(repaired.to_string()) },
+        Report { repair, angles, notes, ..repaired_as(repaired.to_string()) },
     )
 }
 
@@ -324,8 +328,8 @@ fn finish(
     let options = EncodeOptions { check_margins: true, exact, histograms: true, metadata };
     let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let seconds = start.elapsed().as_secs_f64();
-    let Report { repaired, repair, angles, .. } = known;
-    let report = Report { repair, angles, ..report(config, &summary, file_bytes, seconds, repaired) };
+    let Report { repaired, repair, angles, notes, .. } = known;
+    let report = Report { repair, angles, notes, ..report(config, &summary, file_bytes, seconds, repaired) };
     verbosity.print(&report, &rows(output, &report))
 }
 

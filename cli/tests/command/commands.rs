@@ -638,6 +638,9 @@ fn what_a_reader_leaves_out_is_said() {
         output.status.success() && said.contains("note: ") && said.contains("quantized from -1 to 3"),
         "{said}"
     );
+    let report = json(&["build", &input, "-o", &mt, "--json"]);
+    let notes = report["notes"].as_array().expect("a list");
+    assert!(notes.len() == 1 && said.contains(notes[0].as_str().expect("words")), "{report}");
 }
 
 #[test]
