@@ -706,6 +706,7 @@ fn report(
         repaired,
         repair: None,
         angles: None,
+        notes: Vec::new(),
     }
 }
 
