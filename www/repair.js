@@ -63,9 +63,13 @@ export class RepairControls {
 const row = (label, control) =>
   element("div", { className: "row" }, element("label", { htmlFor: control.id, textContent: label }), control);
 
-/** What the repair did and what it left as it is, a sentence each. @param {import("tetralod/build").BuildReport} report */
-export function repairWords({ repaired, repair }) {
-  if (!repair) return [];
-  const found = [repaired, repair.kept].filter(Boolean).map((words) => words.charAt(0).toUpperCase() + words.slice(1));
-  return found.length > 0 ? found : ["The mesh needed no repair, and nothing about it is unusual"];
+/**
+ * What was left out of the file, what the repair did and what it left as it is, a sentence each.
+ *
+ * @param {import("tetralod/build").BuildReport} report
+ */
+export function repairWords({ repaired, repair, notes }) {
+  const found = repair ? [repaired, repair.kept].filter(Boolean) : [];
+  if (repair && found.length === 0) found.push("The mesh needed no repair, and nothing about it is unusual");
+  return [...notes, ...found].map((words) => words.charAt(0).toUpperCase() + words.slice(1));
 }

@@ -323,6 +323,7 @@ impl DisjointSets {
     }
 
     /// How many groups there are.
+    #[cfg(feature = "build")]
     pub fn count(&self) -> usize {
         self.count
     }

@@ -20,7 +20,9 @@ mod repair;
 mod series;
 mod tet_mesh;
 
-pub(crate) use adjacency::{DisjointSets, FaceTable, boundary_faces, match_faces};
+#[cfg(feature = "build")]
+pub(crate) use adjacency::DisjointSets;
+pub(crate) use adjacency::{FaceTable, boundary_faces, match_faces};
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
 pub(crate) use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};

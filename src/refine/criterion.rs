@@ -595,3 +595,27 @@ impl fmt::Debug for LodCriterion {
         f.debug_struct("LodCriterion").field("atoms", &self.atoms.len()).finish_non_exhaustive()
     }
 }
+
+#[cfg(all(test, feature = "build"))]
+mod tests {
+    use super::*;
+    use crate::builder::{BuildConfig, build};
+    use crate::mt::MultiTessellation;
+    use std::ops::ControlFlow;
+
+    #[test]
+    fn margins_fall_by_more_than_rounding_from_each_update_to_the_next() {
+        let mesh = crate::generate::bucky(5).unwrap();
+        let mt = build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(())).unwrap().mt;
+        let frame = Frame::new(mt.info());
+        let margin = |update: u32| {
+            let levels = |_: usize| [0; 4];
+            let (corners, error, update) = (&[[0; 3]; 4], ErrorCode::ZERO, UpdateId(update));
+            frame.margin(&TetData { corners, levels: &levels, error, errors: &[], update })
+        };
+        for update in 1..mt.updates() {
+            assert!(margin(update - 1) - margin(update) > ROUNDING * frame.reach, "{update}");
+        }
+        assert!(margin(0) < 1e-6 * frame.reach);
+    }
+}

@@ -132,4 +132,6 @@ export interface CoreBuildReport {
   repaired: string;
   /** The same in numbers, and what was found and kept. `undefined` for points without cells. */
   repair: RepairReport | undefined;
+  /** What the reader left out of the files or changed, in words. */
+  notes: string[];
 }

@@ -202,6 +202,7 @@ impl MeshBuilder {
         let BuildOptions { config, cells, repair: level, units, metadata } = options;
         let name = self.files.first().map(|file| file.name.clone()).unwrap_or_default();
         let mesh = self.read(&config, cells, &mut stages)?;
+        let notes = mesh.notes.clone();
         stages.begin("repair")?;
         let (mut mesh, repaired) = if mesh.tets.is_empty() {
             expect_points(&mesh, &config, &name)?;
@@ -226,7 +227,7 @@ impl MeshBuilder {
         let bytes = encode(&built.mt, &encoding)?;
         let (repaired, repair) =
             repaired.map_or_else(Default::default, |(done, repair)| (done.to_string(), Some(repair)));
-        Ok(result(&bytes, &config, &built.summary, &repaired, repair))
+        Ok(result(&bytes, &config, &built.summary, &repaired, repair, &notes))
     }
 
     /// The mesh as the files have it. Each file is dropped when it was read.
@@ -390,6 +391,7 @@ struct ReportObject<'a> {
     position_bits: u32,
     repaired: &'a str,
     repair: Option<RepairObject>,
+    notes: &'a [String],
 }
 
 #[derive(Serialize)]
@@ -442,6 +444,7 @@ fn result(
     summary: &BuildSummary,
     repaired: &str,
     repair: Option<RepairObject>,
+    notes: &[String],
 ) -> JsBuilt {
     let construction = config.construction;
     let report = object(&ReportObject {
@@ -457,6 +460,7 @@ fn result(
         position_bits: summary.position_bits,
         repaired,
         repair,
+        notes,
     });
     let built = Object::new();
     for (name, value) in [("bytes", Uint8Array::from(bytes).into()), ("report", report)] {

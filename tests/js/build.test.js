@@ -88,6 +88,13 @@ test("what was repaired, and what was found and kept, is reported", async () => 
   await rejects(repair({ repair: "all" }), "bad-option", /`repair`.*"none", "safe", "weld"/);
 });
 
+test("what was left out of a file is reported", async () => {
+  const text = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 9\n4 0 1 2 3\n3 0 1 2\nCELL_TYPES 2\n10\n5\nPOINT_DATA 4\nSCALARS v float 1\nLOOKUP_TABLE default\n1 2 3 4\n";
+  const { report } = await build(new TextEncoder().encode(text));
+  assert.deepEqual(report.notes, ["left out: 1 triangle"]);
+  assert.deepEqual((await build(await file("tets.vtk"))).report.notes, []);
+});
+
 test("files are inspected before they are built", async () => {
   const grid = await inspect(await file("small.vti"));
   assert.deepEqual([grid.format, grid.dims, grid.points, grid.tetrahedra], ["vti", [17, 17, 17], 17 ** 3, 6 * 16 ** 3]);

@@ -175,7 +175,7 @@ fn nothing_outside_of_a_view_is_asked_for() {
             let eye = middle + size * DVec3::new(0.1, -0.3, 0.2);
             let ways = [[0.6, 1.0, 0.4], [-0.6, 1.0, -0.4], [0.3, 1.0, -1.2], [-0.3, 1.0, 0.9]];
             for camera in ways.map(|way| view(eye, DVec3::from(way), viewport)) {
-                let criterion = LodCriterion::new(info, &Need::seen(camera.clone(), pixels).into());
+                let criterion = LodCriterion::new(info, &Need::seen(camera, pixels).into());
                 let asked = asked(explicit, &criterion);
                 let matrix = DMat4::from_cols_array(&camera.matrix);
                 let [x, y, w] = [0, 1, 3].map(|i| matrix.row(i));
