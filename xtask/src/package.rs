@@ -10,7 +10,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
@@ -65,9 +65,7 @@ pub fn build(names: &[String]) -> Result<()> {
     prepare()?;
     let staging = Path::new("target/pkg-staging");
     remake(staging)?;
-    for module in &MODULES {
-        compile(module, staging)?;
-    }
+    compile_all(MODULES.iter(), staging)?;
     check_cores(staging)?;
     assemble(staging)?;
     report(Path::new(PKG))?;
@@ -84,9 +82,7 @@ fn build_some(modules: &[&Module]) -> Result<()> {
     prepare()?;
     let staging = Path::new("target/pkg-part");
     remake(staging)?;
-    for module in modules {
-        compile(module, staging)?;
-    }
+    compile_all(modules.iter().copied(), staging)?;
     copy_scripts(staging)?;
     move_files(staging, Path::new(PKG))
 }
@@ -109,10 +105,8 @@ pub fn ensure_built() -> Result<()> {
 /// Compiles the module with the benchmark, which the package does not have, into `folder`.
 pub fn build_bench(folder: &Path) -> Result<()> {
     prepare()?;
-    compile(
-        &Module { name: "tetralod_bench", script: "tetralod_bench", features: "web-bench,all-kinds" },
-        folder,
-    )
+    let bench = Module { name: "tetralod_bench", script: "tetralod_bench", features: "web-bench,all-kinds" };
+    compile_all(std::iter::once(&bench), folder)
 }
 
 /// wasm-bindgen's macro and its generator of scripts speak a private protocol: they must be the same version.
@@ -133,6 +127,20 @@ fn locked<'a>(lock: &'a str, package: &str) -> Result<&'a str> {
     lock[at..].split('"').next().context("Cargo.lock ends inside a version")
 }
 
+/// Makes modules in `out`. One is optimised while the next one is compiled, for both take one core most of the time.
+fn compile_all<'a>(modules: impl Iterator<Item = &'a Module>, out: &Path) -> Result<()> {
+    std::thread::scope(|scope| {
+        let mut optimised = Vec::new();
+        for module in modules {
+            compile(module, out)?;
+            let wasm = out.join(format!("{}_bg.wasm", module.name));
+            optimised.push(scope.spawn(move || optimise(&wasm)));
+        }
+        optimised.into_iter().try_for_each(|one| one.join().map_err(|_| anyhow!("optimising failed"))?)
+    })
+}
+
+/// Compiles a module, which is not optimised then.
 fn compile(module: &Module, out: &Path) -> Result<()> {
     let Module { name, script, features } = module;
     println!("building {name} ({features})");
@@ -150,8 +158,7 @@ fn compile(module: &Module, out: &Path) -> Result<()> {
         fs::rename(made.join(&file), out.join(file.replacen(script, name, 1)))
             .with_context(|| format!("moving {file}"))?;
     }
-    fs::remove_dir(&made).with_context(|| made.display().to_string())?;
-    optimise(&out.join(format!("{name}_bg.wasm")))
+    fs::remove_dir(&made).with_context(|| made.display().to_string())
 }
 
 /// The option `wasmUrl` may lead to either core, so both must have the same script. It is there twice, since one that runs
