@@ -172,9 +172,16 @@ fn nothing_outside_of_a_view_is_asked_for() {
             let whole = Bounds::of(&subject.input.mesh.positions);
             let size = whole.diagonal();
             let middle = (DVec3::from(whole.min) + DVec3::from(whole.max)) / 2.0;
-            let eye = middle + size * DVec3::new(0.1, -0.3, 0.2);
-            let ways = [[0.6, 1.0, 0.4], [-0.6, 1.0, -0.4], [0.3, 1.0, -1.2], [-0.3, 1.0, 0.9]];
-            for camera in ways.map(|way| view(eye, DVec3::from(way), viewport)) {
+            let ways = [
+                [1.0, 0.2, 0.1],
+                [-1.0, 0.3, -0.2],
+                [0.2, 1.0, -0.3],
+                [0.1, -1.0, 0.4],
+                [0.3, 0.2, 1.0],
+                [0.2, -0.4, -1.0],
+            ]
+            .map(DVec3::from);
+            for camera in ways.map(|way| view(middle - 0.1 * size * way, way, viewport)) {
                 let criterion = LodCriterion::new(info, &Need::seen(camera, pixels).into());
                 let asked = asked(explicit, &criterion);
                 let matrix = DMat4::from_cols_array(&camera.matrix);
@@ -207,7 +214,7 @@ fn nothing_outside_of_a_view_is_asked_for() {
                 }
             }
         }
-        assert!(left_out.iter().all(|count| *count > 50), "{name}: {left_out:?}");
+        assert!(left_out.iter().all(|count| *count > 20), "{name}: {left_out:?}");
     }
 }
 
@@ -249,7 +256,7 @@ fn values_between_levels_are_not_missed() {
                 }
             }
         }
-        assert!(rounded_down > 100, "{name}: {rounded_down}");
+        assert!(rounded_down > 50, "{name}: {rounded_down}");
     }
 }
 
