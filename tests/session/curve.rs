@@ -12,8 +12,8 @@ use tetralod::session::Session;
 
 const BLOCK_BITS: u32 = 6;
 
-fn file(kind: MtKind) -> Vec<u8> {
-    let mut mesh = generate::sphere_flow(9).expect("a size that is allowed");
+fn file(kind: MtKind, size: u32) -> Vec<u8> {
+    let mut mesh = generate::sphere_flow(size).expect("a size that is allowed");
     let height = mesh.positions.iter().map(|p| p[2] * p[2] * p[0]).collect();
     mesh.fields.push(Field::new("height", height));
     let config = BuildConfig { block_bits: BLOCK_BITS, all_fields: true, ..BuildConfig::of(kind) };
@@ -95,7 +95,7 @@ fn errors_of(curve: &[ErrorBytes]) -> Vec<f64> {
 #[test]
 fn a_session_fetches_what_the_index_states() {
     for kind in [MtKind::Edge, MtKind::HalfEdge] {
-        let file = file(kind);
+        let file = file(kind, 14);
         let mut decoder = Decoder::default();
         decoder.feed(&file).expect("a sound file");
         let names: Vec<String> =
@@ -123,7 +123,7 @@ fn a_session_fetches_what_the_index_states() {
 #[test]
 fn files_that_come_in_order_are_good_enough_by_then() {
     for kind in [MtKind::Vertex, MtKind::Explicit] {
-        let file = file(kind);
+        let file = file(kind, 14);
         let mut whole = Decoder::default();
         whole.feed(&file).expect("a sound file");
         let curve = whole.bytes_by_error(0, 0);
@@ -144,7 +144,7 @@ fn files_that_come_in_order_are_good_enough_by_then() {
 #[test]
 fn histograms_are_those_of_the_volume() {
     for kind in MtKind::ALL {
-        let file = file(kind);
+        let file = file(kind, 9);
         let mut decoder = Decoder::default();
         // In front of the base mesh.
         let index = file.windows(4).position(|bytes| bytes == b"MODL").expect("tables");

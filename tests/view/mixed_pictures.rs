@@ -8,7 +8,7 @@ use tetralod::geom::{Camera, Projection};
 use tetralod::gpu::{Colouring, Lighting, Look, Renderer, SIDES, Style, wait};
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Medium, Plane, Slice, Triangles, VIRIDIS};
 
-const SIZE: [u32; 2] = [64, 48];
+const SIZE: [u32; 2] = [96, 72];
 
 fn iso(scene: &Scene, value: f64) -> IsoSurface {
     let mut surface = IsoSurface::new();
@@ -77,8 +77,10 @@ fn mixed_pictures_are_those_of_the_twin() {
     let Some(mut renderer) = twin::renderer(SIZE) else { return };
     let [(_, fog), _] = twin::media();
     let pixels = SIZE[0] as usize * SIZE[1] as usize;
-    for (mesh, scene) in [("ball", Scene::ball(8)), ("hollow", twin::hollow())] {
-        for case in CASES {
+    for (mesh, scene, cases) in
+        [("ball", Scene::ball(8), &CASES[..]), ("hollow", twin::hollow(), &CASES[4..])]
+    {
+        for &case in cases {
             let mixed = mixed(&mut renderer, &scene, &fog, case);
             for (place, camera) in cameras() {
                 let name = format!("mixed-{mesh}-{case}-{place}");
