@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::thread;
 
 use anyhow::{Context, Result, anyhow, bail};
@@ -32,7 +33,7 @@ pub fn run(args: &[String]) -> Result<()> {
     let viewer = thread::spawn(package::build_viewer);
     let tetralod = shell::demo_command()?;
     let [first, rest] = [&SMALL[..BEFORE_PAGE], &SMALL[BEFORE_PAGE..]];
-    make_volumes(&tetralod, if serve { first } else { &SMALL })?;
+    make_volumes(&tetralod, if serve { first } else { &SMALL }, 1)?;
     viewer.join().map_err(|_| anyhow!("a thread that builds the viewer panicked"))??;
     if !serve {
         draw_all()?;
@@ -91,14 +92,27 @@ pub fn bench_volume() -> Result<PathBuf> {
 
 /// Makes the small volumes that are missing or older than the command that builds them, with thumbnails, and the list of all.
 pub fn make_data(tetralod: &Path) -> Result<()> {
-    make_volumes(tetralod, &SMALL)?;
+    // Most of a build takes one core.
+    make_volumes(tetralod, &SMALL, 2)?;
     volumes::draw_all(tetralod);
     volumes::write_list(tetralod, &[])
 }
 
-fn make_volumes(tetralod: &Path, volumes: &[Volume]) -> Result<()> {
+/// Makes volumes, so many at a time.
+fn make_volumes(tetralod: &Path, volumes: &[Volume], at_a_time: usize) -> Result<()> {
     fs::create_dir_all(DATA)?;
-    volumes.iter().try_for_each(|volume| volumes::make(tetralod, volume, &[]))
+    let next = AtomicUsize::new(0);
+    let work = || {
+        while let Some(volume) = volumes.get(next.fetch_add(1, Relaxed)) {
+            volumes::make(tetralod, volume, &[])?;
+        }
+        Ok(())
+    };
+    thread::scope(|scope| {
+        let workers: Vec<_> = (0..at_a_time).map(|_| scope.spawn(work)).collect();
+        let panicked = |_| anyhow!("a thread that makes volumes panicked");
+        workers.into_iter().try_for_each(|worker| worker.join().map_err(panicked)?)
+    })
 }
 
 /// The same, and the large volume.

@@ -146,7 +146,7 @@ fn compile(module: &Module, out: &Path) -> Result<()> {
     println!("building {name} ({features})");
     let args = ["build", "--package", "tetralod", "--lib", "--profile", "wasm", "--target", shell::WASM];
     let mut command = shell::cargo(args);
-    command.args(["--no-default-features", "--features", features, "--config", &path_free()?]);
+    command.args(["--no-default-features", "--features", features, "--config", &rust_flags()?]);
     shell::run(&mut command)?;
     let wasm = Path::new("target").join(shell::WASM).join("wasm/tetralod.wasm");
     let made = out.join("made");
@@ -172,13 +172,14 @@ fn check_cores(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Panic messages name source files: the same bytes must come out on every machine, and no home folder in them.
-fn path_free() -> Result<String> {
+/// Panic messages name source files: the same bytes must come out on every machine, and no home folder in them. And what a module does
+/// not use is an error.
+fn rust_flags() -> Result<String> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home =
         home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
     let flag = format!("--remap-path-prefix={}=cargo", home.display());
-    Ok(format!("target.{}.rustflags={}", shell::WASM, serde_json::json!([flag])))
+    Ok(format!("target.{}.rustflags={}", shell::WASM, serde_json::json!([flag, "-Dwarnings"])))
 }
 
 fn optimise(wasm: &Path) -> Result<()> {
