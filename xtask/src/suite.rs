@@ -1,4 +1,4 @@
-//! `cargo xtask test`: every check there is, in order of cost. Each step prints a header and its time; the first that
+//! `cargo xtask test`: every check there is, in order of cost (but the npm package is built beside the native tests). Each step prints a header and its time; the first that
 //! fails ends the run. No step is left out because something is missing on the machine; tests in it may be, and say so (see
 //! CONTRIBUTING.md), unless a variable such as `TETRALOD_NEED_GPU` makes that a failure.
 //!
@@ -7,9 +7,10 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 
 use crate::{browser, demo, docs, fixture, package, shell, workflows};
 
@@ -67,11 +68,27 @@ pub fn run(args: &[String]) -> Result<()> {
 }
 
 fn run_all<'a>(steps: impl Iterator<Item = &'a Step>) -> Result<()> {
+    let steps: Vec<_> = steps.collect();
     let mut times = Vec::new();
-    for step in steps {
+    let mut package = None;
+    for step in &steps {
         println!("\n=== {}: {}", step.name, step.what);
         let start = Instant::now();
-        (step.run)().with_context(|| format!("step `{}` failed", step.name))?;
+        if step.name == "native" && steps.iter().any(|later| later.name == "package") {
+            // Its modules are linked on one core each, and so end the last of the tests.
+            println!("(the npm package is built meanwhile)");
+            package = Some(thread::spawn(npm_package));
+        }
+        let built = if step.name == "package" { package.take() } else { None };
+        let done = match built {
+            Some(built) => built.join().map_err(|_| anyhow!("its thread panicked")).flatten(),
+            None => (step.run)(),
+        };
+        if let Err(error) = done {
+            // Nothing is left running.
+            let _ = package.map(thread::JoinHandle::join);
+            return Err(error.context(format!("step `{}` failed", step.name)));
+        }
         println!("--- {}: {:.1} s", step.name, start.elapsed().as_secs_f64());
         times.push((step.name, start.elapsed()));
     }
