@@ -59,7 +59,7 @@ fn a_small_file_takes_no_more_memory_than_there_is() {
     assert!(error.contains("more memory than the 512 MiB that are allowed"), "{error}");
     let (code, error) = limited(1 << 20, &["--field", "f3"]);
     assert_eq!(code, Some(1), "{error}");
-    assert!(error.contains("more than there is (1 GiB)"), "{error}");
+    assert!(error.contains("more than there is (1.0 GiB"), "{error}");
 }
 
 #[test]
