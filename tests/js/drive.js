@@ -10,9 +10,11 @@ export { assertDrawn, differing, distance, study } from "./study.js";
 export const pictures = new URL("../../target/e2e/", import.meta.url);
 export const PATIENCE = 90_000;
 
-let browser;
+let browser, deviceScaleFactor;
 
-export async function begin() {
+/** With less than one pixel of the screen for each of the page, software draws faster. */
+export async function begin(scale = 1) {
+  deviceScaleFactor = scale;
   await mkdir(pictures, { recursive: true });
   browser = await launch();
 }
@@ -20,8 +22,7 @@ export async function begin() {
 export const end = () => browser?.close();
 
 export async function newPage(options) {
-  // Software draws: with fewer pixels the tests take half of the time.
-  const page = await browser.newPage({ deviceScaleFactor: 0.6, ...options });
+  const page = await browser.newPage({ deviceScaleFactor, ...options });
   // Software that draws a volume on a busy machine keeps everything else waiting.
   page.setDefaultTimeout(PATIENCE);
   return page;

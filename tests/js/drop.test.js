@@ -4,7 +4,7 @@ import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { assertDrawn, begin, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, still } from "./drive.js";
 
-before(begin);
+before(() => begin());
 
 after(end);
 

@@ -6,7 +6,7 @@ import { fileURLToPath } from "node:url";
 import { address } from "./browser.js";
 import { addressed, assertDrawn, begin, demo, differing, distance, end, newPage, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still, study } from "./drive.js";
 
-before(begin);
+before(() => begin(0.6));
 
 after(end);
 

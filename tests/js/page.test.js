@@ -6,7 +6,7 @@ import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { addressed, assertDrawn, begin, demo, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still } from "./drive.js";
 
-before(begin);
+before(() => begin());
 
 after(end);
 
