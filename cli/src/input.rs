@@ -37,7 +37,7 @@ impl Source<'_> {
     /// The most memory that reading may take.
     pub fn limit(&self) -> MemoryLimit {
         let most = self.memory.or_else(|| Some(machine::memory()? / 2));
-        most.map_or(MemoryLimit::NONE, MemoryLimit::of)
+        most.map_or_else(MemoryLimit::default, MemoryLimit::of)
     }
 }
 

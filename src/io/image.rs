@@ -110,7 +110,7 @@ pub(super) fn read(
     let whole_place = || format!("<{}>", document.kind);
     let (placement, whole) = read_placement(document).at(whole_place)?;
     let mut grid = InParts::default();
-    let time = for_each_file(document, (beside, &options.memory), &mut |file| {
+    let time = for_each_file(document, beside, &options.memory, &mut |file| {
         for (number, piece) in file.full_pieces() {
             let reader = PieceReader { document: file, piece, number, options };
             grid.add(&reader, whole, Vec::new())?;

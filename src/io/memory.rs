@@ -22,9 +22,6 @@ struct Counted {
 }
 
 impl MemoryLimit {
-    /// No limit.
-    pub const NONE: Self = Self(None);
-
     /// So many bytes at most.
     pub fn of(bytes: u64) -> Self {
         Self(Some(Arc::new(Counted { most: bytes, taken: AtomicU64::new(0) })))

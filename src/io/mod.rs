@@ -309,29 +309,32 @@ type ReadFile<'a> = &'a mut dyn FnMut(&xml::Document<'_>) -> Result<(), ReadErro
 /// Has `read` read the document, or the files that it lists, whose bytes count in the limit; returns the time of the first one that has one.
 fn for_each_file(
     document: &xml::Document<'_>,
-    beside: (Beside<'_>, &MemoryLimit),
+    beside: Beside<'_>,
+    memory: &MemoryLimit,
     read: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
     if !document.kind.starts_with(IN_FILES) {
         read(document)?;
         return Ok(document.time());
     }
-    read_listed(document, beside, read)
+    read_listed(document, beside, memory, read)
 }
 
 #[cfg(feature = "formats")]
 fn read_listed(
     document: &xml::Document<'_>,
-    beside: (Beside<'_>, &MemoryLimit),
+    beside: Beside<'_>,
+    memory: &MemoryLimit,
     read: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
-    pvtu::for_each_file(document, beside, read)
+    pvtu::for_each_file(document, beside, memory, read)
 }
 
 #[cfg(not(feature = "formats"))]
 fn read_listed(
     document: &xml::Document<'_>,
-    _: (Beside<'_>, &MemoryLimit),
+    _: Beside<'_>,
+    _: &MemoryLimit,
     _: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
     Err(not_read(&document.kind)).at(String::new)

@@ -65,7 +65,7 @@ impl Pieces {
         let mut counts = PieceCounts::default();
         let files = FilesOf::new(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
-        let counted = for_each_file(&document, (&beside, &self.options.memory), &mut |file| {
+        let counted = for_each_file(&document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let points = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
                 let tets = reader.most_tets()?;
@@ -116,7 +116,7 @@ impl Pieces {
         let files = FilesOf::new(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
         let mut hashes = Vec::new();
-        let time = for_each_file(document, (&beside, &self.options.memory), &mut |file| {
+        let time = for_each_file(document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let points = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
                 hashes.extend(reader.points(points)?.into_iter().map(hash));
@@ -125,7 +125,7 @@ impl Pieces {
         })?;
         let time = document.time().or(time);
         let mut seen = Seen { several: repeated(hashes), ..Seen::default() };
-        for_each_file(document, (&beside, &self.options.memory), &mut |file| {
+        for_each_file(document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let mut piece = seen.read(reader)?;
                 let MeshPiece { mesh: TetMesh { fields, cell_fields, input, .. }, .. } = &mut piece;

@@ -21,14 +21,15 @@ pub(super) fn read(
     beside: Beside<'_>,
 ) -> Result<(TetMesh, Option<f64>), ReadError> {
     let mut whole = Whole::default();
-    let time = for_each_file(document, (beside, &options.memory), &mut |file| whole.append(file, options))?;
+    let time = for_each_file(document, beside, &options.memory, &mut |file| whole.append(file, options))?;
     Ok((whole.mesh, time))
 }
 
 /// Has `read` read the files that are listed, one after the other; returns the time of the first one that has one.
 pub(super) fn for_each_file(
     document: &Document<'_>,
-    (beside, memory): (Beside<'_>, &MemoryLimit),
+    beside: Beside<'_>,
+    memory: &MemoryLimit,
     read: ReadFile<'_>,
 ) -> Result<Option<f64>, ReadError> {
     let mut time = None;

@@ -165,7 +165,7 @@ pub(super) fn read(
     let place = || format!("<{}>", document.kind);
     let (whole, dims) = whole(document).at(place)?;
     let mut grid = image::InParts::default();
-    let time = for_each_file(document, (beside, &options.memory), &mut |file| {
+    let time = for_each_file(document, beside, &options.memory, &mut |file| {
         for (number, piece) in file.full_pieces() {
             let reader = PieceReader { document: file, piece, number, options };
             grid.add(&reader, whole, coordinates(&reader, whole)?)?;

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::io::{CellData, MemoryLimit, ReadError, ReadOptions};
+use crate::io::{CellData, ReadError, ReadOptions};
 use crate::mesh::{Field, GeometryField, StepError, TetMesh};
 
 /// Which fields of the files of a mesh are wanted.
@@ -83,13 +83,8 @@ impl FieldSelection<'_> {
     pub fn options(&self) -> ReadOptions {
         let names = self.names.iter().chain(self.labels).cloned().collect();
         let fields = if self.all { None } else { Some(names) };
-        ReadOptions {
-            fields,
-            first: !self.all && self.names.is_empty(),
-            cells: self.cells,
-            step: 0,
-            memory: MemoryLimit::NONE,
-        }
+        let first = !self.all && self.names.is_empty();
+        ReadOptions { fields, first, cells: self.cells, ..ReadOptions::default() }
     }
 }
 

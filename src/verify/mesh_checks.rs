@@ -240,10 +240,10 @@ impl Counts {
     /// The shape of the mesh, whose boundary must be closed.
     fn shape(self, vertices: usize, tets: usize) -> Result<Shape, String> {
         let Self { edges, faces, components, boundary } = self;
-        // Each edge with its triangle, and which corner is not its end.
-        let mut ends: Vec<([u32; 2], usize, usize)> = Vec::with_capacity(3 * boundary.len());
-        for (f, &[a, b, c]) in boundary.iter().enumerate() {
-            ends.extend([([b, c], f, 0), ([a, c], f, 1), ([a, b], f, 2)]);
+        // Each edge with the corners at its ends: corner `c` of triangle `f` is number `3 · f + c`.
+        let mut ends: Vec<([u32; 2], [usize; 2])> = Vec::with_capacity(3 * boundary.len());
+        for (at, &[a, b, c]) in (0..).step_by(3).zip(&boundary) {
+            ends.extend([([b, c], [at + 1, at + 2]), ([a, c], [at, at + 2]), ([a, b], [at, at + 1])]);
         }
         ends.sort_unstable();
         let mut surfaces = DisjointSets::of(boundary.len());
@@ -251,19 +251,15 @@ impl Counts {
         let mut fans = DisjointSets::of(3 * boundary.len());
         let (mut boundary_edges, mut touching) = (0, Vec::new());
         for group in ends.chunk_by(|a, b| a.0 == b.0) {
-            let (edge, first, apex) = group[0];
+            let (edge, first) = group[0];
             if group.len() % 2 != 0 {
                 return Err(format!("the boundary is open at the edge {edge:?}"));
             }
             boundary_edges += 1;
-            for &(_, other, other_apex) in &group[1..] {
-                surfaces.join(first, other);
+            for (_, other) in &group[1..] {
+                surfaces.join(first[0] / 3, other[0] / 3);
                 if group.len() == 2 {
-                    let corner = |f: usize, apex: usize, end: usize| {
-                        3 * f + (0..3).filter(|c| *c != apex).nth(end).unwrap_or(0)
-                    };
-                    (0..2)
-                        .for_each(|end| fans.join(corner(first, apex, end), corner(other, other_apex, end)));
+                    (0..2).for_each(|end| fans.join(first[end], other[end]));
                 }
             }
             if group.len() > 2 {

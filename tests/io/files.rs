@@ -180,6 +180,13 @@ pub fn block(style: Style, array: &Array) -> Vec<Vec<u8>> {
     vec![head, packed.concat()]
 }
 
+/// The bytes as a file in gzip.
+pub fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
 fn in_base64(parts: &[Vec<u8>]) -> String {
     parts.iter().map(|p| STANDARD.encode(p)).collect()
 }

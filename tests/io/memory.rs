@@ -2,7 +2,7 @@
 
 use crate::damaged::files;
 use crate::files::*;
-use flate2::{Compression, write::GzEncoder};
+use flate2::Compression;
 use std::io::Write;
 use tetralod::io::{self, CellData, MemoryLimit, ReadError, ReadOptions, ReadReason};
 use tetralod::mesh::{Field, TetMesh};
@@ -86,19 +86,13 @@ fn pieces_in_one_place_count_each() {
     assert_eq!(read("a.vtu", &file, 3 * bytes_of(&whole), None).unwrap(), whole);
 }
 
-fn in_gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    encoder.write_all(bytes).unwrap();
-    encoder.finish().unwrap()
-}
-
 #[test]
 fn packed_files_count_as_what_they_unpack_to() {
     // A comment of 64 MB.
     let mut file = sample_vti(Style::PLAIN);
     let end = file.windows(5).position(|window| window == b"made ").unwrap();
     file.splice(end..end, std::iter::repeat_n(b' ', 64 << 20));
-    let packed = in_gzip(&file);
+    let packed = gzip(&file);
     assert!(packed.len() < 1 << 17);
     assert!(is_refused(&read("a.vti.gz", &packed, 16 << 20, None)));
 }
@@ -107,7 +101,7 @@ fn packed_files_count_as_what_they_unpack_to() {
 #[test]
 fn packed_samples_count_as_what_they_unpack_to() {
     let head = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: gzip\n\n";
-    let nrrd = [head.as_bytes(), &in_gzip(&vec![1; 1 << 21])].concat();
+    let nrrd = [head.as_bytes(), &gzip(&vec![1; 1 << 21])].concat();
     let mut zlib = flate2::write::ZlibEncoder::new(Vec::new(), Compression::best());
     zlib.write_all(&vec![1; 1 << 21]).unwrap();
     let head = "ObjectType = Image\nNDims = 3\nDimSize = 128 128 128\nElementType = MET_UCHAR\nCompressedData = True\n\

@@ -1,10 +1,9 @@
 //! Valid files of VTK's formats that are unusual: hidden cells, turned grids, cells of any order, empty pieces, packed files, and what
 //! nobody asked for.
 
-use std::io::Write;
-
 use crate::curved::HEXAHEDRON;
 use crate::data::real_data;
+use crate::files::gzip;
 use tetralod::io::{self, CellData, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -293,9 +292,7 @@ fn what_is_not_stated_is_text() {
 #[test]
 fn packed_files_are_unpacked_or_named() {
     let file = vtu(&TETRAHEDRON, &[(10, &ALL)], "");
-    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
-    encoder.write_all(file.as_bytes()).unwrap();
-    let packed = encoder.finish().unwrap();
+    let packed = gzip(file.as_bytes());
     assert_eq!(read_with("a.vtu.gz", &packed, &ReadOptions::default()), read("a.vtu", &file));
     assert_eq!((io::format_of(&packed), io::survey("a", &packed).unwrap().points), (Some("vtu"), 4));
     let error = io::read_bytes("a.vtu.bz2", b"BZh91AY&SY").unwrap_err().to_string();

@@ -1,5 +1,5 @@
-//! `cargo xtask test`: every check there is, in order of cost (but the npm package is built beside the native tests). Each step prints a header and its time; the first that
-//! fails ends the run. No step is left out because something is missing on the machine; tests in it may be, and say so (see
+//! `cargo xtask test`: every check there is, in order of cost; but the npm package is built beside the native tests. Each step
+//! prints a header and its time; the first that fails ends the run. No step is left out because something is missing on the machine; tests in it may be, and say so (see
 //! CONTRIBUTING.md), unless a variable such as `TETRALOD_NEED_GPU` makes that a failure.
 //!
 //! A feature set of its own compiles the crate and what it needs again. So lints, documentation, tests and the command that

@@ -366,13 +366,9 @@ mod tests {
     use super::*;
     use crate::io::CellData;
 
-    const EVERYTHING: ReadOptions = ReadOptions {
-        fields: None,
-        first: false,
-        cells: CellData::Values,
-        step: 0,
-        memory: crate::io::MemoryLimit::NONE,
-    };
+    fn everything() -> ReadOptions {
+        ReadOptions { cells: CellData::Values, ..ReadOptions::default() }
+    }
 
     /// A tetrahedron and a triangle, with tags that are not in order.
     pub(super) const TWO: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 \"a $b\"\n$EndPhysicalNames\n\
@@ -381,7 +377,7 @@ mod tests {
         $ElementData\n1\n\"q\"\n1\n0\n3\n0\n1\n2\n5 0.5\n1 9\n$EndElementData\n";
 
     fn check(bytes: &[u8]) {
-        let mesh = read(bytes, &EVERYTHING).unwrap();
+        let mesh = read(bytes, &everything()).unwrap();
         assert_eq!(mesh.positions, [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]]);
         assert_eq!(mesh.tets, [[0, 1, 2, 3]]);
         let fields: Vec<_> = mesh.fields.iter().map(|f| (f.name.as_str(), f.values.clone())).collect();
@@ -501,7 +497,7 @@ mod tests {
                 check(&binary(version, big));
             }
         }
-        let mesh = read(TWO.as_bytes(), &EVERYTHING).unwrap();
+        let mesh = read(TWO.as_bytes(), &everything()).unwrap();
         assert!(mesh.cell_fields.iter().any(|f| f.name == "physical" && f.values == [6.0]));
     }
 
@@ -509,7 +505,7 @@ mod tests {
     fn groups_of_volumes_in_version_4() {
         let [four_one, four, _] = ascii();
         let groups = |text: &str| {
-            let mesh = read(text.as_bytes(), &EVERYTHING).unwrap();
+            let mesh = read(text.as_bytes(), &everything()).unwrap();
             mesh.cell_fields.iter().find(|f| f.name == "physical").map(|f| f.values.clone())
         };
         assert_eq!(groups(&four_one), None);
@@ -548,7 +544,7 @@ mod tests {
         ]
         .concat();
         assert_eq!(gmsh_views::times(two.as_bytes()), [0.0, 0.5]);
-        let read_step = |step: usize| read(two.as_bytes(), &ReadOptions { step, ..EVERYTHING });
+        let read_step = |step: usize| read(two.as_bytes(), &ReadOptions { step, ..everything() });
         for (step, first, time) in [(0, 1.0, 0.0), (1, 10.0, 0.5)] {
             let mesh = read_step(step).unwrap();
             let names: Vec<&str> = mesh.fields.iter().map(|field| field.name.as_str()).collect();
@@ -560,7 +556,7 @@ mod tests {
         // Steps of one time, as of modes: their numbers are the times.
         let modes = two.replace("1\n0.5\n3", "1\n0\n3");
         assert_eq!(gmsh_views::times(modes.as_bytes()), [0.0, 1.0]);
-        let one = read(TWO.as_bytes(), &EVERYTHING).unwrap();
+        let one = read(TWO.as_bytes(), &everything()).unwrap();
         assert_eq!((gmsh_views::times(TWO.as_bytes()).len(), one.fields[0].time), (0, None));
     }
 
@@ -572,12 +568,12 @@ mod tests {
             &view("NodeData", "T", ["0", "0", "1"], &ROWS[2..]),
         ]
         .concat();
-        let mesh = read(parts.as_bytes(), &EVERYTHING).unwrap();
+        let mesh = read(parts.as_bytes(), &everything()).unwrap();
         assert_eq!((mesh.fields.len(), &mesh.fields[1].values), (2, &vec![1.0, 2.0, 3.0, 4.0]));
         // What has the same nodes is another view of that name.
         let twice = [TWO, &view("NodeData", "T", ["0", "0", "1"], &ROWS).repeat(2)].concat();
         let names: Vec<_> =
-            read(twice.as_bytes(), &EVERYTHING).unwrap().fields.into_iter().map(|f| f.name).collect();
+            read(twice.as_bytes(), &everything()).unwrap().fields.into_iter().map(|f| f.name).collect();
         assert_eq!(names, ["T (K)", "T", "T_2"]);
     }
 
@@ -585,7 +581,7 @@ mod tests {
     fn values_at_nodes_of_elements() {
         let at = |rows: &[&str]| {
             let file = [TWO, &view("ElementNodeData", "s", ["0", "0", "1"], rows)].concat();
-            read(file.as_bytes(), &EVERYTHING).unwrap()
+            read(file.as_bytes(), &everything()).unwrap()
         };
         let equal = at(&["5 4 1 2 3 4", "1 3 9 9 9"]);
         assert_eq!(
@@ -609,16 +605,16 @@ mod tests {
     #[test]
     fn nodes_of_no_element_need_no_value() {
         let more = TWO.replace("$Nodes\n4\n", "$Nodes\n5\n11 5 5 5\n");
-        let mesh = read(more.as_bytes(), &EVERYTHING).unwrap();
+        let mesh = read(more.as_bytes(), &everything()).unwrap();
         assert_eq!(mesh.fields[0].values, [0.0, 1.0, 2.0, 3.0, 4.0]);
         let not_finite = more.replace("1\n4\n4 4\n", "1\n5\n11 nan\n4 4\n");
-        assert_eq!(read(not_finite.as_bytes(), &EVERYTHING).unwrap().fields[0].values[0], 0.0);
+        assert_eq!(read(not_finite.as_bytes(), &everything()).unwrap().fields[0].values[0], 0.0);
     }
 
     #[test]
     fn sections_that_are_left_out_are_said() {
         let more = format!("{TWO}$Periodic\n0\n$EndPeriodic\n$Mine\n1 2\n$EndMine\n");
-        assert_eq!(read(more.as_bytes(), &EVERYTHING).unwrap().notes, ["section $Mine is left out"]);
+        assert_eq!(read(more.as_bytes(), &everything()).unwrap().notes, ["section $Mine is left out"]);
     }
 
     #[test]
@@ -627,7 +623,7 @@ mod tests {
         let section = "$PartitionedEntities\n2\n0\n1 0 0 1\n1 0 9 1 1 0 0 0 1 7\n\
             5 3 2 1 1 0 0 0 1 1 1 1 6 0\n$EndPartitionedEntities\n$Nodes";
         let text = four_one.replacen("$Nodes", section, 1).replace("\n3 2 4 1\n", "\n3 5 4 1\n");
-        let mesh = read(text.as_bytes(), &EVERYTHING).unwrap();
+        let mesh = read(text.as_bytes(), &everything()).unwrap();
         let of = |name: &str| mesh.cell_fields.iter().find(|f| f.name == name).map(|f| f.values.clone());
         assert_eq!((of("physical"), of("entity")), (Some(vec![6.0]), Some(vec![2.0])));
     }
@@ -638,10 +634,10 @@ mod tests {
         files.extend(ascii().map(String::into_bytes));
         files.extend(["2.2", "4.0", "4.1"].map(|version| binary(version, false)));
         for mut file in files {
-            (0..file.len()).for_each(|length| drop(read(&file[..length], &EVERYTHING)));
+            (0..file.len()).for_each(|length| drop(read(&file[..length], &everything())));
             for bit in 0..8 * file.len() {
                 file[bit / 8] ^= 1 << (bit % 8);
-                drop(read(&file, &EVERYTHING));
+                drop(read(&file, &everything()));
                 file[bit / 8] ^= 1 << (bit % 8);
             }
         }
@@ -651,7 +647,7 @@ mod tests {
     fn errors_say_where_and_what() {
         let refused = |from: &str, to: &str| {
             assert!(TWO.contains(from));
-            read(TWO.replacen(from, to, 1).as_bytes(), &EVERYTHING).unwrap_err().to_string()
+            read(TWO.replacen(from, to, 1).as_bytes(), &everything()).unwrap_err().to_string()
         };
         assert!(refused("9 0 1 0", "9 0 x 0").contains("$Nodes, line 12: \"x\" is not a number"));
         assert!(refused("2.2 0 8", "3.0 0 8").contains("version \"3.0\" cannot be read here"));

@@ -142,19 +142,13 @@ mod tests {
     use super::*;
     use crate::io::CellData;
 
-    const OPTIONS: ReadOptions = ReadOptions {
-        fields: None,
-        first: false,
-        cells: CellData::Values,
-        step: 0,
-        memory: crate::io::MemoryLimit::NONE,
-    };
     const NODES: &str =
         "# points\n5 3 1 1\n1 0 0 0 10 1\n2 1 0 0 20 1\n3 0 1 0 30 1\n4 0 0 1 40 0\n5 0 0 -1 50 0\n";
     const CELLS: &str = "2 4 1\n1 1 2 3 4 7\n2 1 3 2 5 8\n# made by hand\n";
 
     fn read_both(nodes: &str, cells: &str) -> Result<TetMesh, ReadReason> {
-        let mut draft = Draft::new(&OPTIONS);
+        let options = ReadOptions { cells: CellData::Values, ..ReadOptions::default() };
+        let mut draft = Draft::new(&options);
         let first = read_nodes(&mut Scanner::with_comments(nodes.as_bytes()), &mut draft)?;
         read_cells(&mut Scanner::with_comments(cells.as_bytes()), &mut draft, first)?;
         draft.finish()
