@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::io;
-use tetralod::io::{CellData, FieldSelection, MemoryLimit, ReadOptions, Step};
+use tetralod::io::{CellData, FieldSelection, MemoryLimit, ReadOptions, ReadReason, Step};
 use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, repair_at};
 use tetralod::verify::Reference;
 
@@ -36,8 +36,11 @@ pub struct Source<'a> {
 impl Source<'_> {
     /// The most memory that reading may take.
     pub fn limit(&self) -> MemoryLimit {
-        let most = self.memory.or_else(|| Some(machine::memory()? / 2));
-        most.map_or_else(MemoryLimit::default, MemoryLimit::of)
+        self.most().map_or_else(MemoryLimit::default, MemoryLimit::of)
+    }
+
+    fn most(&self) -> Option<u64> {
+        self.memory.or_else(|| Some(machine::memory()? / 2))
     }
 }
 
@@ -89,7 +92,12 @@ pub fn read_cells(
     let memory = source.limit();
     let mut input = Vec::new();
     if steps.iter().any(|step| step.path == Path::new(STANDARD_INPUT)) {
-        std::io::stdin().read_to_end(&mut input).context("the standard input could not be read")?;
+        let most = source.most().unwrap_or(u64::MAX);
+        let mut stdin = std::io::stdin().take(most.saturating_add(1));
+        stdin.read_to_end(&mut input).context("the standard input could not be read")?;
+        if input.len() as u64 > most {
+            return Err(ReadReason::Memory { limit: most }).context("standard input");
+        }
         check_format(&input, source.format)?;
     }
     let named: Vec<_> = steps.iter().map(|step| (name(&step.path), step.time)).collect();

@@ -14,6 +14,9 @@ use crate::io::write::escaped;
 use crate::io::xml::Attributes;
 use crate::io::{MemoryLimit, beside, in_file, load, lower_extension, packed, without_gz};
 
+/// Most bytes of a list, unpacked if it is in gzip: some hundred thousand time steps.
+const MOST_BYTES: u64 = 1 << 26;
+
 /// A file that holds one time step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
@@ -40,9 +43,9 @@ pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
         }
         return Ok(times.into_iter().map(Some).enumerate().map(step).collect());
     }
-    let no_limit = &MemoryLimit::default();
-    let listed = load(path, no_limit)
-        .and_then(|bytes| packed::unpacked(&bytes, no_limit).and_then(|bytes| parse(&bytes)).at(String::new));
+    let memory = &MemoryLimit::of(MOST_BYTES);
+    let listed = load(path, memory)
+        .and_then(|bytes| packed::unpacked(&bytes, memory).and_then(|bytes| parse(&bytes)).at(String::new));
     let listed = listed.map_err(|error| in_file(error, &path.display().to_string()))?;
     let step = |(time, file): (Option<f64>, String)| {
         let path = beside::place(path, &file).at(String::new)?;

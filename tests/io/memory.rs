@@ -97,6 +97,17 @@ fn packed_files_count_as_what_they_unpack_to() {
     assert!(is_refused(&read("a.vti.gz", &packed, 16 << 20, None)));
 }
 
+#[test]
+fn lists_are_not_unpacked_to_any_size() {
+    let folder = std::env::temp_dir().join(format!("tetralod-lists-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let list = folder.join("a.pvd.gz");
+    std::fs::write(&list, gzip(&vec![b' '; 80 << 20])).unwrap();
+    let refused = io::steps(&list);
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(matches!(refused, Err(ReadError { reason: ReadReason::Memory { .. }, .. })));
+}
+
 #[cfg(feature = "formats")]
 #[test]
 fn packed_samples_count_as_what_they_unpack_to() {

@@ -259,5 +259,8 @@ fn the_standard_input_is_read() {
     let refused = piped(&["build", "-", "-o", &same, "--field", "nothing"]);
     let error = text(&refused.stderr);
     assert!(error.starts_with("error: standard input: there is no point field"), "{error}");
+    let refused = piped(&["build", "-", "-o", &same, "--memory", "16"]);
+    let error = text(&refused.stderr);
+    assert!(error.contains("standard input: reading it takes more memory than the 16 bytes"), "{error}");
     bad(2, &["build", &input, "-o", &mt, "--format", "vtk"], &["--format", "'-'"]);
 }
