@@ -48,7 +48,7 @@ pub fn run(args: &[String]) -> Result<()> {
     if let Some(arg) = args.first() {
         bail!("`bench --beside-vtk` takes no argument, got `{arg}`");
     }
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Released)?;
     shell::install_node_packages(Path::new(SOURCES))?;
     make_data(&shell::released_command()?)?;
     let mut command = shell::command("node", [format!("{SOURCES}/run.js")]);

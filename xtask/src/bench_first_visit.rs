@@ -19,7 +19,7 @@ pub fn run(options: &[String]) -> Result<()> {
     if let Some(option) = options.first() {
         bail!("`bench --first-visit` takes no argument, got `{option}`");
     }
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Released)?;
     // As users get it: it answers while the page is timed.
     let tetralod = shell::released_command()?;
     demo::make_all(&tetralod)?;

@@ -25,7 +25,7 @@ pub fn run(args: &[String]) -> Result<()> {
 
 /// Makes the site; warnings, such as links to nowhere, are errors.
 pub fn build() -> Result<()> {
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Tested)?;
     shell::install_node_packages(Path::new(SOURCES))?;
     let typedoc = format!("{SOURCES}/node_modules/typedoc/bin/typedoc");
     let options = format!("{SOURCES}/typedoc.config.mjs");

@@ -51,7 +51,29 @@ const WASM_FEATURES: [&str; 6] = [
     "--enable-sign-ext",
 ];
 
-/// Builds `pkg/` from nothing and prints the sizes of its wasm files; with names, only these modules of it, as [`build_some`] does.
+/// How modules are compiled.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Profile {
+    /// As they are published.
+    Released,
+    /// In a third of the time, with every assertion: as the native tests are.
+    Tested,
+}
+
+impl Profile {
+    /// The name of cargo's profile, and of the folder with what it makes.
+    fn cargo(self) -> [&'static str; 2] {
+        match self {
+            Profile::Released => ["wasm", "wasm"],
+            Profile::Tested => ["dev", "debug"],
+        }
+    }
+}
+
+/// Names the profile of `pkg/`. It is not in there, since all that is there is published.
+const MADE: &str = "target/pkg-profile";
+
+/// Builds `pkg/` from nothing as it is published, and checks its sizes; with names, only these modules of it, as [`build_some`] does.
 pub fn build(names: &[String]) -> Result<()> {
     let named = |name: &String| {
         let found = MODULES.iter().find(|module| module.name.strip_prefix("tetralod_") == Some(name));
@@ -62,14 +84,24 @@ pub fn build(names: &[String]) -> Result<()> {
     if !names.is_empty() {
         return build_some(&names.iter().map(named).collect::<Result<Vec<_>>>()?);
     }
+    build_all(Profile::Released)?;
+    report(Path::new(PKG))?;
+    shell::run(&mut shell::command("node", ["xtask/js/sizes.mjs", PKG]))
+}
+
+/// Builds `pkg/` from nothing for tests.
+pub fn build_for_tests() -> Result<()> {
+    build_all(Profile::Tested)
+}
+
+fn build_all(profile: Profile) -> Result<()> {
     prepare()?;
     let staging = Path::new("target/pkg-staging");
     remake(staging)?;
-    compile_all(MODULES.iter(), staging)?;
+    compile_all(MODULES.iter(), profile, staging)?;
     check_cores(staging)?;
     assemble(staging)?;
-    report(Path::new(PKG))?;
-    shell::run(&mut shell::command("node", ["xtask/js/sizes.mjs", PKG]))
+    fs::write(MADE, profile.cargo()[0]).context(MADE)
 }
 
 /// Puts into `pkg/` what the demo's page needs to draw. [`build`] makes the rest.
@@ -82,7 +114,7 @@ fn build_some(modules: &[&Module]) -> Result<()> {
     prepare()?;
     let staging = Path::new("target/pkg-part");
     remake(staging)?;
-    compile_all(modules.iter().copied(), staging)?;
+    compile_all(modules.iter().copied(), Profile::Released, staging)?;
     copy_scripts(staging)?;
     move_files(staging, Path::new(PKG))
 }
@@ -93,20 +125,22 @@ fn prepare() -> Result<()> {
     shell::install_node_tools()
 }
 
-/// Builds `pkg/` where there is no complete one yet, as steps need that are run by themselves on a fresh checkout.
-pub fn ensure_built() -> Result<()> {
-    // It is made last.
-    if Path::new(PKG).join("inline.js").is_file() {
+/// Builds `pkg/` where there is no complete one yet, or only one for tests, and that would not do.
+pub fn ensure_built(profile: Profile) -> Result<()> {
+    let made = fs::read_to_string(MADE).unwrap_or_default();
+    // The scripts are made last.
+    let is_there = Path::new(PKG).join("inline.js").is_file();
+    if is_there && [Profile::Released, profile].iter().any(|good| made == good.cargo()[0]) {
         return shell::install_node_tools();
     }
-    build(&[])
+    build_all(profile)
 }
 
 /// Compiles the module with the benchmark, which the package does not have, into `folder`.
 pub fn build_bench(folder: &Path) -> Result<()> {
     prepare()?;
     let bench = Module { name: "tetralod_bench", script: "tetralod_bench", features: "web-bench,all-kinds" };
-    compile_all(std::iter::once(&bench), folder)
+    compile_all(std::iter::once(&bench), Profile::Released, folder)
 }
 
 /// wasm-bindgen's macro and its generator of scripts speak a private protocol: they must be the same version.
@@ -128,27 +162,30 @@ fn locked<'a>(lock: &'a str, package: &str) -> Result<&'a str> {
 }
 
 /// Makes modules in `out`. One is optimised while the next one is compiled, for both take one core most of the time.
-fn compile_all<'a>(modules: impl Iterator<Item = &'a Module>, out: &Path) -> Result<()> {
+fn compile_all<'a>(modules: impl Iterator<Item = &'a Module>, profile: Profile, out: &Path) -> Result<()> {
     std::thread::scope(|scope| {
         let mut optimised = Vec::new();
         for module in modules {
-            compile(module, out)?;
+            compile(module, profile, out)?;
             let wasm = out.join(format!("{}_bg.wasm", module.name));
-            optimised.push(scope.spawn(move || optimise(&wasm)));
+            if profile == Profile::Released {
+                optimised.push(scope.spawn(move || optimise(&wasm)));
+            }
         }
         optimised.into_iter().try_for_each(|one| one.join().map_err(|_| anyhow!("optimising failed"))?)
     })
 }
 
 /// Compiles a module, which is not optimised then.
-fn compile(module: &Module, out: &Path) -> Result<()> {
+fn compile(module: &Module, profile: Profile, out: &Path) -> Result<()> {
     let Module { name, script, features } = module;
     println!("building {name} ({features})");
-    let args = ["build", "--package", "tetralod", "--lib", "--profile", "wasm", "--target", shell::WASM];
+    let [profile, folder] = profile.cargo();
+    let args = ["build", "--package", "tetralod", "--lib", "--profile", profile, "--target", shell::WASM];
     let mut command = shell::cargo(args);
     command.args(["--no-default-features", "--features", features, "--config", &rust_flags()?]);
     shell::run(&mut command)?;
-    let wasm = Path::new("target").join(shell::WASM).join("wasm/tetralod.wasm");
+    let wasm = Path::new("target").join(shell::WASM).join(folder).join("tetralod.wasm");
     let made = out.join("made");
     // As wasm-bindgen's command line has it: the script knows where its module is.
     let mut bindgen = Bindgen::new();

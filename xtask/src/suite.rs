@@ -27,7 +27,7 @@ const STEPS: [Step; 14] = [
     Step { name: "doc", what: "documentation without broken links", run: doc },
     Step { name: "native", what: "unit, integration and documentation tests", run: native },
     Step { name: "workflows", what: "building in parts, with a process killed", run: workflows::test },
-    Step { name: "package", what: "the npm package and its size", run: npm_package },
+    Step { name: "package", what: "the npm package, compiled as the tests are", run: npm_package },
     Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
     Step { name: "js", what: "lints and types of all JavaScript, and the package in Node", run: js },
     Step { name: "consumer", what: "installing and type-checking the packed package", run: consumer },
@@ -171,7 +171,7 @@ fn quick() -> Result<()> {
 }
 
 fn npm_package() -> Result<()> {
-    package::build(&[])
+    package::build_for_tests()
 }
 
 const WEB_FEATURES: [&str; 3] = ["--no-default-features", "--features", "web-bench,gpu,all-kinds"];
@@ -196,7 +196,7 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 }
 
 fn js() -> Result<()> {
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Tested)?;
     shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["lint", "--error-on-warnings"]))?;
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;
     shell::run(&mut node_test("actions.test.js"))?;
@@ -242,7 +242,7 @@ fn node_test(file: &str) -> Command {
 /// Packs the package as npm would publish it, has its entries and types checked by publint and are-the-types-wrong, installs the
 /// archive in a project of its own outside the repository's `node_modules`, and compiles and runs that project.
 fn consumer() -> Result<()> {
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Tested)?;
     let (source, project) = (Path::new("tests/js/consumer"), shell::root().join("target/consumer"));
     if project.exists() {
         std::fs::remove_dir_all(&project)?;
@@ -291,7 +291,7 @@ fn site() -> Result<()> {
 }
 
 fn pages() -> Result<()> {
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Tested)?;
     shell::install_node_packages(Path::new(docs::SOURCES))?;
     let mut command = node_test("docs.test.js");
     command.env("TETRALOD", shell::tested_command()?).env("CHROMIUM", browser::require()?.chromium);
@@ -301,13 +301,13 @@ fn pages() -> Result<()> {
 /// The projects of `examples/js`, with the packed package, in headless Chromium and in Node.
 fn examples() -> Result<()> {
     let browser = browser::require()?;
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Tested)?;
     with_fixture(|| shell::run(fixture_env(node_test("examples.test.js").env("CHROMIUM", &browser.chromium))))
 }
 
 fn e2e() -> Result<()> {
     let browser = browser::require()?;
-    package::ensure_built()?;
+    package::ensure_built(package::Profile::Tested)?;
     let tetralod = shell::tested_command()?;
     demo::make_data(&tetralod)?;
     let server = demo::start_server(&tetralod, 0)?;
