@@ -21,8 +21,11 @@ export async function begin(scale = 1) {
 
 export const end = () => browser?.close();
 
-export async function newPage(options) {
-  const page = await browser.newPage({ deviceScaleFactor, ...options });
+export async function newPage(given) {
+  const options = { deviceScaleFactor, ...given };
+  const page = await browser.newPage(options);
+  // It is that of the real screen, whatever the scale: without it, a canvas has the pixels that the page believes in.
+  if (options.deviceScaleFactor !== 1) await page.addInitScript(() => Reflect.deleteProperty(ResizeObserverEntry.prototype, "devicePixelContentBoxSize"));
   // Software that draws a volume on a busy machine keeps everything else waiting.
   page.setDefaultTimeout(PATIENCE);
   return page;

@@ -13,6 +13,8 @@ after(end);
 const SMALL = "data/bucky-explicit.mt";
 /** Software draws large pictures slowly. */
 const VIEWPORT = { viewport: { width: 900, height: 620 } };
+/** Where all views are drawn, and nobody looks at details. */
+const COARSE = { ...VIEWPORT, deviceScaleFactor: 0.5 };
 
 const screenshot = (page, name) => page.screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) });
 
@@ -108,7 +110,7 @@ async function checker(page) {
 }
 
 test("the page has no accessibility violations, light or dark", async () => {
-  const page = await open(SMALL, undefined, VIEWPORT);
+  const page = await open(SMALL, undefined, COARSE);
   await reach(page, "complete");
   const check = await checker(page);
   const dialog = async (name, id, key) => {
@@ -136,7 +138,7 @@ test("the page has no accessibility violations, light or dark", async () => {
 });
 
 test("nor has it with several views, probes, a region, messages, the map of blocks, and the dialog of a build", async () => {
-  const page = await open("data/abc-flow.mt", undefined, VIEWPORT);
+  const page = await open("data/abc-flow.mt", undefined, COARSE);
   await reach(page, "complete");
   await setSlider(page, "error", 80);
   const check = await checker(page);
