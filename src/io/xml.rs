@@ -328,6 +328,32 @@ struct Parser<'a> {
     in_unit: bool,
 }
 
+/// What arrays a piece may have: of its geometry, of values, and of what has no volume.
+const SECTIONS: [&str; 10] = [
+    "Points",
+    "Cells",
+    "Coordinates",
+    "PointData",
+    "CellData",
+    "FieldData",
+    "Verts",
+    "Lines",
+    "Strips",
+    "Polys",
+];
+
+fn check_section(name: &str) -> Result<(), ReadReason> {
+    if SECTIONS.contains(&name) {
+        return Ok(());
+    }
+    let name: String = name.chars().take(48).collect();
+    let remedy = "leave it out, if the piece is complete without it".into();
+    Err(ReadReason::Unsupported { what: format!("a section <{name}> of a piece"), remedy })
+}
+
+/// The last major version of the format that VTK 9 knows, and refuses later ones as we do.
+const LAST_VERSION: u32 = 2;
+
 /// VTK's key for the unit of an array.
 const UNIT_KEY: &str = "UNITS_LABEL";
 
@@ -343,7 +369,11 @@ impl<'a> Parser<'a> {
             (["VTKFile", _], "Piece") => {
                 self.pieces.push(Piece { attributes: Attributes::of(element)?, arrays: Vec::new() });
             }
+            (["VTKFile", _, "Piece"], "Points" | "Cells" | "Coordinates") if self.has(&name) => {
+                return Err(ReadReason::Syntax(format!("a piece has two sections <{name}>")));
+            }
             (["VTKFile", _, "Piece", section], "DataArray") => {
+                check_section(section)?;
                 let array = self.new_array((*section).to_owned(), element)?;
                 if let Some(piece) = self.pieces.last_mut() {
                     piece.arrays.push(array);
@@ -369,6 +399,11 @@ impl<'a> Parser<'a> {
 
     fn kind(&self) -> Option<&str> {
         self.file.as_ref()?.get("type")
+    }
+
+    /// Whether the last piece has arrays in this section.
+    fn has(&self, section: &str) -> bool {
+        self.pieces.last().is_some_and(|piece| piece.section(section).next().is_some())
     }
 
     fn new_array(&self, section: String, element: &BytesStart<'_>) -> Result<Array<'a>, ReadReason> {
@@ -414,6 +449,11 @@ impl<'a> Parser<'a> {
         let appended =
             self.appended.map(|a| appended(&a, data)).transpose().at(|| "<AppendedData>".into())?;
         let (pieces, field_data, version) = (self.pieces, self.field_data, version(&file));
+        if version[0] > LAST_VERSION {
+            let what = format!("version {}.{} of the format", version[0], version[1]);
+            let remedy = "have it written by VTK 9".into();
+            return Err(ReadReason::Unsupported { what, remedy }).at(|| "<VTKFile>".into());
+        }
         Ok(Document { kind, version, name: String::new(), dataset, pieces, field_data, framing, appended })
     }
 }

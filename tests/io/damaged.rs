@@ -247,6 +247,12 @@ fn errors_say_file_place_reason_and_remedy() {
     assert!(text("type=\"UnstructuredGrid\"", "type=\"PolyData\"").contains("PolyData"));
     assert!(text("LittleEndian", "MiddleEndian").contains("byte_order=\"MiddleEndian\" is not known"));
     assert!(text("</Cells>", "</Sells>").contains("not well-formed XML"));
+    let section = |name: &str| format!("</Cells><{name}><DataArray type=\"Int8\" Name=\"a\"/></{name}>");
+    assert!(text("</Cells>", &section("Sells")).contains("a section <Sells> of a piece cannot be read"));
+    assert!(
+        text("</Cells>", &[section("Cells"), section("Cells")].concat()).contains("two sections <Cells>")
+    );
+    assert!(text("Grid\" version=\"", "Grid\" version=\"3").contains("version 3"));
     let unknown = io::read_bytes("a.txt", b"words").unwrap_err();
     assert_eq!(unknown.reason, ReadReason::UnknownFormat);
     let surface = io::read_bytes("a.stl", b"solid").unwrap_err().to_string();

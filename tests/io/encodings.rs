@@ -206,6 +206,32 @@ fn raw_samples_from_files_by_either_name() {
 }
 
 #[test]
+fn a_key_of_a_sidecar_that_could_change_the_meaning_is_refused() {
+    let read = |more: &str| {
+        let sidecar = format!("{{\"dims\": [2, 2, 2], \"type\": \"uint8\"{more}}}");
+        io::read_raw("a.json", sidecar.as_bytes(), &[0, 1, 2, 3, 4, 5, 6, 7])
+            .map_err(|error| error.to_string())
+    };
+    let plain = read("").expect("nothing that is optional");
+    for remark in [
+        r#", "name": "a", "description": "b", "source": "c", "license": "d", "range": [0, 7]"#,
+        r#", "order": "x fastest, then y, then z""#,
+    ] {
+        assert_eq!(read(remark).as_ref(), Ok(&plain), "{remark}");
+    }
+    for (more, words) in [
+        (r#", "byteOrder": "big""#, "the key \"byteOrder\""),
+        (r#", "order": "zyx""#, "the order \"zyx\""),
+        (r#", "endian": 1"#, "\"endian\" is not a text"),
+        (r#", "field": ["a"]"#, "\"field\" is not a text"),
+        (r#", "skip": 3"#, "the key \"skip\""),
+    ] {
+        let error = read(more).expect_err(more);
+        assert!(error.contains(words), "{more}: {error}");
+    }
+}
+
+#[test]
 fn what_is_written_reads_back() {
     let mut bytes = Vec::new();
     io::write_vtu(&sample(), &mut bytes).unwrap();
