@@ -4,6 +4,9 @@ import { createServer } from "node:http";
 import { chromium } from "playwright-core";
 import puppeteer from "puppeteer-core";
 
+/** How long a browser on a busy machine may take for anything (in ms). */
+export const PATIENCE = 90_000;
+
 const config = JSON.parse(await readFile(new URL("../../webdriver.json", import.meta.url), "utf8"));
 
 /**
@@ -12,14 +15,22 @@ const config = JSON.parse(await readFile(new URL("../../webdriver.json", import.
  *
  * @returns {Promise<any>}
  */
-export function launch() {
+export async function launch() {
   const { FIREFOX } = process.env;
   if (FIREFOX) return puppeteer.launch({ browser: "firefox", executablePath: FIREFOX, headless: true });
   const executablePath = process.env.CHROMIUM;
   if (!executablePath) throw new Error("CHROMIUM is not set: run this through `cargo xtask`");
   // Playwright's own choice of headless mode and of features would contradict the flags.
   const ignoreDefaultArgs = ["--headless", "--headless=old", "--disable-gpu", "--hide-scrollbars"];
-  return chromium.launch({ executablePath, args: config["goog:chromeOptions"].args, ignoreDefaultArgs });
+  const browser = await chromium.launch({ executablePath, args: config["goog:chromeOptions"].args, ignoreDefaultArgs });
+  const newPage = browser.newPage.bind(browser);
+  browser.newPage = async (options) => {
+    const page = await newPage(options);
+    // Software that draws a volume on a busy machine keeps everything else waiting.
+    page.setDefaultTimeout(PATIENCE);
+    return page;
+  };
+  return browser;
 }
 
 /** The address that `cargo xtask` serves at. */

@@ -2,13 +2,13 @@
 import assert from "node:assert/strict";
 import { mkdir, writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
-import { address, launch } from "./browser.js";
+import { address, launch, PATIENCE } from "./browser.js";
 import { study } from "./study.js";
 
-export { assertDrawn, differing, distance, study } from "./study.js";
+export { PATIENCE } from "./browser.js";
+export { assertDrawn, assertLike, differing, distance, study } from "./study.js";
 
 export const pictures = new URL("../../target/e2e/", import.meta.url);
-export const PATIENCE = 90_000;
 
 let browser, deviceScaleFactor;
 
@@ -26,15 +26,12 @@ export async function newPage(given) {
   const page = await browser.newPage(options);
   // It is that of the real screen, whatever the scale: without it, a canvas has the pixels that the page believes in.
   if (options.deviceScaleFactor !== 1) await page.addInitScript(() => Reflect.deleteProperty(ResizeObserverEntry.prototype, "devicePixelContentBoxSize"));
-  // Software that draws a volume on a busy machine keeps everything else waiting.
-  page.setDefaultTimeout(PATIENCE);
   return page;
 }
 
 /** A new page with `volume` opened; its errors are collected in `complaints`. */
 export async function open(volume, prepare = async (_page) => {}, options = {}) {
   const page = await newPage({ viewport: { width: 960, height: 660 }, ...options });
-  page.setDefaultTimeout(PATIENCE);
   page.complaints = [];
   page.on("pageerror", (error) => page.complaints.push(String(error)));
   page.on("console", (message) => message.type() === "error" && page.complaints.push(message.text()));

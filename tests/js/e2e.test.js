@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { address } from "./browser.js";
-import { addressed, assertDrawn, begin, demo, differing, distance, end, newPage, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still, study } from "./drive.js";
+import { addressed, assertDrawn, assertLike, begin, demo, differing, distance, end, newPage, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still, study } from "./drive.js";
 
 before(() => begin(0.6));
 
@@ -20,6 +20,7 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
 
   const surface = await picture(page, "isosurface");
   assertDrawn(surface);
+  assertLike(surface, "isosurface");
   assert.ok((await demo(page, "frame")).triangles > 500);
 
   const coarse = await setSlider(page, "error", 90);
@@ -38,6 +39,7 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
     await page.locator("label", { hasText: view }).first().click();
     const shown = await picture(page, view.toLowerCase());
     assertDrawn(shown);
+    assertLike(shown, view.toLowerCase());
     assert.ok(differing(cut, shown) > 0.03, `${view} is another picture`);
     const labels = await page.locator("#legend-ticks span").allTextContents();
     assert.ok(labels.length >= 2 && new Set(labels).size === labels.length, `the colour bar has ticks: ${labels}`);
@@ -46,6 +48,7 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   await page.selectOption("#colour-by", "depth");
   const depths = await picture(page, "depth");
   assert.ok(differing(cut, depths) > 0.03, "the depth of refinement has other colours");
+  assertLike(depths, "depth");
   await page.waitForFunction(() => document.querySelector("#legend-name").textContent === "depth");
   await page.selectOption("#colour-by", "field");
   cut = await picture(page, "mesh-again");
@@ -137,7 +140,9 @@ test("the page draws every dataset of the demo, of every kind of MT", async () =
     await reach(page, "complete");
     assert.equal((await demo(page, "info")).kind, kind);
     assert.equal(await page.locator("#volume option:checked").innerText(), title);
-    assertDrawn(await picture(page, name));
+    const first = await picture(page, name);
+    assertDrawn(first);
+    assertLike(first, name);
     const coarse = await setSlider(page, "error", 90);
     seen[name] = await setSlider(page, "error", 0);
     assert.ok(coarse.tetrahedra < seen[name].tetrahedra, name);
@@ -443,7 +448,9 @@ test("colours have ranges, and the transfer function is edited", async () => {
   assert.equal((await opacities()).length, ramp.length + 2);
   await page.locator("#transfer-add").click();
   assert.equal((await opacities()).length, ramp.length + 3);
-  assertDrawn(await picture(page, "transfer"));
+  const volume = await picture(page, "transfer");
+  assertDrawn(volume);
+  assertLike(volume, "transfer");
   await page.screenshot({ path: fileURLToPath(new URL("page-transfer.png", pictures)) });
   assert.deepEqual(page.complaints, []);
   await page.close();
@@ -578,6 +585,7 @@ test("a flow has streamlines, arrows and time steps that play", async () => {
   await show(flow, "Flow");
   const tubes = await picture(flow, "flow");
   assertDrawn(tubes);
+  assertLike(tubes, "flow");
   assert.match(await flow.locator("#legend-name").innerText(), /^speed in m\/s$/);
   const seeds = () => flow.evaluate(() => window.tetralodDemo.viewer.state.streamlines.seeds.length);
   assert.equal(await seeds(), 64);
@@ -588,7 +596,9 @@ test("a flow has streamlines, arrows and time steps that play", async () => {
   await flow.locator("#no-seeds").click();
   await flow.check("#arrows");
   await flow.selectOption("#flow-colour", "field");
-  assert.ok(differing(tubes, await picture(flow, "arrows")) > 0.03, "there are arrows");
+  const arrows = await picture(flow, "arrows");
+  assert.ok(differing(tubes, arrows) > 0.03, "there are arrows");
+  assertLike(arrows, "arrows");
   assert.equal(await flow.locator("#legend-name").innerText(), "pressure");
   await flow.uncheck("#arrows");
   await flow.screenshot({ path: fileURLToPath(new URL("page-flow.png", pictures)) });

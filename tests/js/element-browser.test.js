@@ -4,7 +4,7 @@ import { mkdir, readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { launch, servePackage } from "./browser.js";
-import { assertDrawn, differing, study } from "./study.js";
+import { assertDrawn, assertLike, differing, study } from "./study.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test e2e`");
@@ -87,6 +87,7 @@ test("the element of the README draws what its attributes say, under a strict po
     await page.evaluate((attributes) => Object.assign(document.querySelector("tetralod-viewer"), attributes), attributes);
     const next = await picture(page, name);
     assertDrawn(next, name);
+    assertLike(next, `element-${name}`);
     assert.ok(differing(last, next) > least, `${name}: only ${differing(last, next)} of the pixels differ`);
     last = next;
   };

@@ -8,7 +8,7 @@ import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { promisify } from "node:util";
 import { launch } from "./browser.js";
-import { assertDrawn, study } from "./study.js";
+import { assertDrawn, assertLike, study } from "./study.js";
 
 const fixture = process.env.TETRALOD_FIXTURE;
 assert.ok(fixture, "TETRALOD_FIXTURE is not set: run `cargo xtask test examples`");
@@ -92,8 +92,8 @@ async function draws(name, { folder = name, what = "canvas", prepare = async (_p
   ranges = 0;
   await page.goto(development ?? server.address);
   const canvas = page.locator(what).first();
-  let [seen, last] = [{ covered: 0, colours: 0 }, ""];
-  for (let same = 0, tries = 0; same < 2 && tries < 80 && complaints.length === 0; tries++) {
+  let [seen, last, same] = [{ covered: 0, colours: 0, grid: "" }, "", 0];
+  for (let tries = 0; same < 2 && tries < 80 && complaints.length === 0; tries++) {
     await page.waitForTimeout(500);
     const png = await canvas.screenshot({ timeout: 30_000 });
     seen = await study(page, png);
@@ -103,7 +103,9 @@ async function draws(name, { folder = name, what = "canvas", prepare = async (_p
   }
   await page.screenshot({ path: fileURLToPath(new URL(`example-${name}.png`, pictures)) });
   assert.deepEqual(complaints, [], name);
+  assert.equal(same, 2, `${name}: the picture never comes to rest`);
   assertDrawn(seen, name);
+  assertLike(seen, `example-${name}`);
   await page.close();
   server.close();
 }

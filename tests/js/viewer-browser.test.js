@@ -163,7 +163,7 @@ test("after `open` alone the mesh becomes the one that the picture needs", async
       events.length = 0;
       const { finished } = await viewer.open("/model.mt", options);
       await finished;
-      await new Promise((resolve) => setTimeout(resolve, 300));
+      await viewer.settled();
       return (await viewer.mesh()).tets.length / 4;
     };
     const [parts, whole] = [await after({}), await after({ whole: true })];
@@ -216,7 +216,7 @@ test("a request that is given up leaves the one before it", async () => {
     alone.abort();
     const third = await gone;
     await viewer.freeze(false);
-    await new Promise((resolve) => setTimeout(resolve, 500));
+    await viewer.settled();
     return { first, second, third, whole, tetrahedra, now: (await viewer.mesh()).tets.length / 4, early: await codeOf(viewer.surface({ signal: AbortSignal.abort() })) };
   });
   const { first, second, third, whole, tetrahedra, now, early } = seen;
