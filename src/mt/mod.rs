@@ -1,7 +1,8 @@
 //! The Multi-Tessellation itself [§2]: what it is made of and what every kind of it can do.
 //!
 //! [`EdgeMt`], [`VertexMt`] and [`HalfEdgeMt`] are the compact structures that files hold and programs use; [`ExplicitMt`]
-//! stores every tetrahedron, as the oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
+//! stores every tetrahedron, as the oracle of tests; [`VertexTreeMt`] has the nodes of the paper in the place of those of [`VertexMt`], to compare
+//! them. All are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
 //! are applied through the trait [`ApplyUpdates`].
 
 #[macro_use]
@@ -22,6 +23,7 @@ mod replay;
 mod stats;
 mod update_errors;
 mod vertex;
+mod vertex_tree;
 
 pub use any::Mt;
 pub use convert::ConvertError;
@@ -52,6 +54,8 @@ pub use vertex::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 pub use vertex::store::{NodeBits, VertexMt};
 pub(crate) use vertex::streaming::Insertion;
 pub use vertex::tet_errors::MAX_QUARTERINGS;
+pub use vertex_tree::rebuild::MOST_TRIES;
+pub use vertex_tree::store::{MostNeighbors, TreeExceptions, VertexTreeMt};
 
 use crate::geom::{Bounds, Lattice, SinglePoints, SingleValues};
 use crate::mesh::{Field, VectorPart};

@@ -13,8 +13,8 @@ use proptest::prelude::*;
 use std::collections::{HashMap, HashSet};
 use tetralod::geom::Bounds;
 use tetralod::mt::{
-    Applied, ApplyUpdates, CurrentMesh, ErrorCode, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
-    stats,
+    Applied, ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, MostNeighbors, Mt, MtKind, MultiTessellation,
+    UpdateId, UpdatePages, VertexTreeMt, stats,
 };
 use tetralod::refine::{Budget, Front, LodCriterion, Need, Outcome, Region, Request};
 
@@ -25,17 +25,17 @@ macro_rules! conformance {
 
             #[test]
             fn any_order_of_updates_makes_the_mesh_of_the_set() {
-                any_order($how);
+                any_order($how, as_built);
             }
 
             #[test]
             fn small_mts_in_every_consistent_set() {
-                every_consistent_set($how);
+                every_consistent_set($how, as_built);
             }
 
             #[test]
             fn requests_have_the_answer_of_the_explicit_mt() {
-                requests($how);
+                requests($how, as_built);
             }
 
             #[test]
@@ -74,6 +74,75 @@ conformance! {
     half_edge_in_pages: PAGED,
 }
 
+/// The same of structures that are made of an explicit MT and live in memory alone, so that nothing arrives.
+macro_rules! conformance_in_memory {
+    ($($name:ident: $how:expr, $structure:expr,)*) => {$(
+        mod $name {
+            use super::*;
+
+            #[test]
+            fn any_order_of_updates_makes_the_mesh_of_the_set() {
+                any_order($how, $structure);
+            }
+
+            #[test]
+            fn small_mts_in_every_consistent_set() {
+                every_consistent_set($how, $structure);
+            }
+
+            #[test]
+            fn requests_have_the_answer_of_the_explicit_mt() {
+                requests($how, $structure);
+            }
+
+            proptest! {
+                #![proptest_config(config(12, 7))]
+
+                #[test]
+                fn random_domains(domain in domain($how), seed in any::<u64>(), fields in 1_usize..4) {
+                    let mut random = Random(seed);
+                    let subject = Subject::new($how, random_input(domain, fields, &mut random));
+                    let subject = subject.expect("a domain that suits the builder");
+                    let mut walk = Walk::new(&subject, $structure(&subject));
+                    walk.wander(150, &mut random);
+                    walk.assert_hash_of_the_set();
+                    walk.go_back(&mut random);
+                }
+            }
+        }
+    )*};
+}
+
+conformance_in_memory! {
+    trees_by_half_edges: HALF_EDGE, narrow_trees,
+    trees_by_half_edges_for_64_neighbors: HALF_EDGE, wide_trees,
+    trees_by_delaunay_removal: DELAUNAY, narrow_trees,
+    trees_by_delaunay_insertion: INSERTED, narrow_trees,
+    trees_by_delaunay_insertion_for_64_neighbors: INSERTED, wide_trees,
+}
+
+/// The structure that the builder made.
+fn as_built(subject: &Subject) -> Mt {
+    subject.mt.clone()
+}
+
+/// The paper's node code, with 12 bits for a boundary face.
+fn narrow_trees(subject: &Subject) -> VertexTreeMt {
+    trees(subject, MostNeighbors::ThirtyTwo)
+}
+
+/// And with 14.
+fn wide_trees(subject: &Subject) -> VertexTreeMt {
+    trees(subject, MostNeighbors::SixtyFour)
+}
+
+fn trees(subject: &Subject, limit: MostNeighbors) -> VertexTreeMt {
+    let trees = VertexTreeMt::from_explicit(&subject.explicit, limit).expect("an MT of insertions");
+    let Ok(spelled) = ExplicitMt::of(&trees) else { panic!("not an MT: {}", subject.input.name) };
+    assert!(trees.updates() == 0 || spelled == subject.explicit, "{}", subject.input.name);
+    trees
+}
+
 fn domain(how: How) -> BoxedStrategy<Domain> {
     let convex = prop_oneof![1 => Just(Domain::SingleTet), 4 => (1_usize..=4).prop_map(Domain::Cube)];
     if !how.method.keeps_the_mesh() {
@@ -95,9 +164,9 @@ fn subjects(how: How) -> impl Iterator<Item = Subject> {
 
 /// A mesh on its way through consistent sets of an MT that may still be arriving.
 #[derive(Clone)]
-struct Walk<'a> {
+struct Walk<'a, M> {
     subject: &'a Subject,
-    mt: Mt,
+    mt: M,
     mesh: CurrentMesh,
     set: Vec<bool>,
     done: usize,
@@ -106,8 +175,8 @@ struct Walk<'a> {
     compare_every: usize,
 }
 
-impl<'a> Walk<'a> {
-    fn new(subject: &'a Subject, mt: Mt) -> Self {
+impl<'a, M: ApplyUpdates + Clone> Walk<'a, M> {
+    fn new(subject: &'a Subject, mt: M) -> Self {
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.updates_arrived(&mut mesh, 0);
         let set = vec![false; subject.explicit.updates() as usize];
@@ -228,12 +297,12 @@ impl<'a> Walk<'a> {
     }
 }
 
-fn any_order(how: How) {
+fn any_order<M: ApplyUpdates + Clone>(how: How, structure: impl Fn(&Subject) -> M) {
     let (mut done, mut blocked) = (0, 0);
     for (seed, subject) in (0..).zip(subjects(how)) {
         assert_eq!(subject.explicit.check(), Ok(()), "{}", subject.input.name);
         let mut random = Random::new(seed);
-        let mut walk = Walk::new(&subject, subject.mt.clone());
+        let mut walk = Walk::new(&subject, structure(&subject));
         walk.wander(400, &mut random);
         walk.go_back(&mut random);
         (done, blocked) = (done + walk.done, blocked + walk.blocked);
@@ -243,7 +312,7 @@ fn any_order(how: How) {
 
 /// The last updates of small MTs, or all of them, so few that every consistent set can be visited: from each, every one
 /// of them is tried.
-fn every_consistent_set(how: How) {
+fn every_consistent_set<M: ApplyUpdates + Clone>(how: How, structure: impl Fn(&Subject) -> M) {
     let (mut sets, mut whole) = (0, 0);
     let cells = [[2, 1, 1], [2, 2, 1], [2, 2, 2], [9, 1, 1], [5, 5, 4], [4, 3, 3], [6, 4, 2], [3, 3, 5]];
     for (cells, seed) in cells.into_iter().zip(0..) {
@@ -254,15 +323,15 @@ fn every_consistent_set(how: How) {
         let updates = subject.explicit.updates();
         let first = updates - updates.min(10);
         whole += u32::from(first == 0);
-        sets += visit_all(&subject, first, &mut Random::new(seed));
+        sets += visit_all(&subject, structure(&subject), first, &mut Random::new(seed));
     }
     assert!(sets > 150 && whole > 0, "{sets} sets of {whole} whole MTs");
 }
 
 /// Visits every consistent set that holds all updates before `first`, tries everything from there, and counts them.
-fn visit_all(subject: &Subject, first: u32, random: &mut Random) -> usize {
+fn visit_all<M: ApplyUpdates + Clone>(subject: &Subject, mt: M, first: u32, random: &mut Random) -> usize {
     let updates = subject.explicit.updates();
-    let mut start = Walk::new(subject, subject.mt.clone());
+    let mut start = Walk::new(subject, mt);
     (0..first).for_each(|u| assert_eq!(start.toggle(u), Applied::Done));
     let mut seen = HashMap::from([(0_u32, start.mesh.hash())]);
     let mut stack = vec![start];
@@ -322,33 +391,34 @@ fn random_request(subject: &Subject, random: &mut Random) -> Request {
     }
 }
 
-fn requests(how: How) {
+fn requests<M: ApplyUpdates>(how: How, structure: impl Fn(&Subject) -> M) {
     for (seed, subject) in (50..).zip(subjects(how)) {
         let mut random = Random::new(seed);
-        let mut front = Front::new(&subject.mt).expect("a valid base mesh");
+        let mt = structure(&subject);
+        let mut front = Front::new(&mt).expect("a valid base mesh");
         let mut spelled = Front::new(&subject.explicit).expect("a valid base mesh");
         let base = front.mesh().hash();
         for _ in 0..60 {
             let request = random_request(&subject, &mut random);
-            let outcome = satisfy(&mut front, &subject.mt, &request);
+            let outcome = satisfy(&mut front, &mt, &request);
             // How much had to be looked at is each structure's own affair.
             let judged = outcome.judged;
             let other = Outcome { judged, ..satisfy(&mut spelled, &subject.explicit, &request) };
             assert_eq!(other, outcome, "{request:?}");
-            let set: Vec<bool> = (0..subject.mt.updates()).map(|u| front.contains(UpdateId(u))).collect();
-            assert!((0..subject.mt.updates()).all(|u| spelled.contains(UpdateId(u)) == set[u as usize]));
-            subject.assert_is(&subject.mt, front.mesh(), &set);
+            let set: Vec<bool> = (0..mt.updates()).map(|u| front.contains(UpdateId(u))).collect();
+            assert!((0..mt.updates()).all(|u| spelled.contains(UpdateId(u)) == set[u as usize]));
+            subject.assert_is(&mt, front.mesh(), &set);
             assert_eq!(front.mesh().hash(), spelled.mesh().hash());
-            let mut fresh = Front::new(&subject.mt).expect("a valid base mesh");
-            let alone = satisfy(&mut fresh, &subject.mt, &request);
+            let mut fresh = Front::new(&mt).expect("a valid base mesh");
+            let alone = satisfy(&mut fresh, &mt, &request);
             assert_eq!((alone.error, alone.satisfied), (outcome.error, outcome.satisfied));
             assert_eq!(fresh.mesh().hash(), front.mesh().hash(), "what was asked before shows: {request:?}");
         }
-        satisfy(&mut front, &subject.mt, &Request::within(f64::INFINITY));
+        satisfy(&mut front, &mt, &Request::within(f64::INFINITY));
         assert_eq!(front.mesh().hash(), base);
-        satisfy(&mut front, &subject.mt, &Request::within(0.0));
-        assert_eq!(front.mesh().tet_count(), subject.mt.info().tetrahedra as usize);
-        assert_eq!(front.mesh().vertex_count(), subject.mt.info().vertices as usize);
+        satisfy(&mut front, &mt, &Request::within(0.0));
+        assert_eq!(front.mesh().tet_count(), mt.info().tetrahedra as usize);
+        assert_eq!(front.mesh().vertex_count(), mt.info().vertices as usize);
     }
 }
 
@@ -618,7 +688,7 @@ mod random_splits {
             };
             for subject in subjects(plan) {
                 dependent += subject.ancestors.iter().filter(|above| !above.is_empty()).count();
-                visit_all(&subject, 0, &mut Random(seed));
+                visit_all(&subject, subject.mt.clone(), 0, &mut Random(seed));
             }
         }
         assert!(dependent > 100, "the tiny MTs have hardly any dependencies: {dependent}");

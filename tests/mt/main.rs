@@ -10,3 +10,4 @@ mod hostile;
 mod layers;
 #[path = "../support/mod.rs"]
 mod support;
+mod vertex_tree;

@@ -366,8 +366,9 @@ impl VertexMt {
         at + u64::from(COUNT_BITS) + self.nodes.get(at, COUNT_BITS)
     }
 
+    /// Puts the star of the vertex that `u` inserts in the place of T_u, once all of it is found.
     #[inline]
-    fn perform_insertion(
+    pub(in crate::mt) fn perform_insertion(
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
@@ -411,13 +412,15 @@ impl VertexMt {
         mesh.touch(&slots[reused..new]);
     }
 
-    /// Collects the star of the vertex that `u` inserted and builds T_u from it, in numbers; the mesh stays as it is. Tells
-    /// a child of `u` that has to go first, if there is one.
-    fn rebuild(
+    /// Collects the star of the vertex that `u` inserted and builds T_u from it, in numbers, by `build`, which finds link and walls in
+    /// canonical order; the mesh stays as it is. Tells a child of `u` that has to go first, if there is one.
+    #[inline]
+    pub(in crate::mt) fn rebuild(
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
         cavity: &mut Cavity,
+        build: impl FnOnce(&CurrentMesh, &mut Cavity) -> Option<()>,
     ) -> Result<Applied, UpdateError> {
         let vertex = self.vertex(u);
         let torn = UpdateError::Cavity { update: u.0 };
@@ -444,7 +447,7 @@ impl VertexMt {
         }
         cavity.order_link(mesh);
         self.sort(cavity);
-        self.build_removed(mesh, u, cavity).ok_or(torn.clone())?;
+        build(mesh, cavity).ok_or(torn.clone())?;
         cavity.fingerprint_built(mesh);
         if KindWord(cavity.fingerprint.0) != mesh.labels[slot as usize].kind_word {
             return Err(torn);
@@ -500,7 +503,16 @@ impl VertexMt {
         (cavity.fill.len == shape.removed).then_some(())
     }
 
-    fn perform_removal(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) {
+    /// Puts T_u, once it is built, in the place of the star of the vertex that `u` inserted. `tag_of` says which tag each tetrahedron
+    /// gets.
+    #[inline]
+    pub(in crate::mt) fn perform_removal(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        cavity: &mut Cavity,
+        tag_of: impl Fn(usize) -> u32,
+    ) {
         let kept = self.kept_quarterings(u, cavity);
         let Cavity { fill, star, walls, link, .. } = cavity;
         let (old, new) = (star.len, fill.len);
@@ -533,12 +545,29 @@ impl VertexMt {
                     }
                 };
             }
-            mesh.set_tag(t, u.0);
+            mesh.set_tag(t, tag_of(i));
             if let Some(kept) = &kept {
                 mesh.set_tet_byte(t, kept[i]);
             }
             mesh.mark_tet(t);
             tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
+        }
+    }
+}
+
+/// Shows `look` the tetrahedra that were built, with their quarterings where these are kept, until it returns true.
+pub(in crate::mt) fn show_built(
+    mesh: &CurrentMesh,
+    cavity: &Cavity,
+    kept: Option<[u8; GATHERED]>,
+    look: LookAtTet<'_>,
+) {
+    for (i, tet) in cavity.fill.tets[..cavity.fill.len].iter().enumerate() {
+        let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
+        let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
+        let own = kept.map_or(0, |kept| kept[i]);
+        if look(&tet.map(|v| mesh.positions[v as usize]), &levels, own) {
+            break;
         }
     }
 }
@@ -610,9 +639,10 @@ impl ApplyUpdates for VertexMt {
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
         let mut cavity = take_cavity(mesh);
-        let rebuilt = self.rebuild(mesh, u, &mut cavity);
+        let build = |mesh: &CurrentMesh, cavity: &mut Cavity| self.build_removed(mesh, u, cavity);
+        let rebuilt = self.rebuild(mesh, u, &mut cavity, build);
         if rebuilt == Ok(Applied::Done) {
-            self.perform_removal(mesh, u, &mut cavity);
+            self.perform_removal(mesh, u, &mut cavity, |_| u.0);
         }
         mesh.put_back_kind_state(cavity);
         rebuilt
@@ -625,17 +655,10 @@ impl ApplyUpdates for VertexMt {
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
         let mut cavity = take_cavity(mesh);
-        let rebuilt = self.rebuild(mesh, u, &mut cavity);
+        let build = |mesh: &CurrentMesh, cavity: &mut Cavity| self.build_removed(mesh, u, cavity);
+        let rebuilt = self.rebuild(mesh, u, &mut cavity, build);
         if rebuilt == Ok(Applied::Done) {
-            let kept = self.kept_quarterings(u, &cavity);
-            for (i, tet) in cavity.fill.tets[..cavity.fill.len].iter().enumerate() {
-                let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
-                let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
-                let own = kept.map_or(0, |kept| kept[i]);
-                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, own) {
-                    break;
-                }
-            }
+            show_built(mesh, &cavity, self.kept_quarterings(u, &cavity), look);
         }
         mesh.put_back_kind_state(cavity);
         rebuilt

@@ -17,11 +17,11 @@ use crate::mt::{CurrentMesh, PagedArray};
 const GIVEN_UP: u32 = 0xFF;
 
 /// Room for the new slots, and for [`GIVEN_UP`].
-pub(super) const SLOTS: usize = 256;
+pub(in crate::mt) const SLOTS: usize = 256;
 
 /// A face of Π_u with what lies beyond.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Wall {
+pub(in crate::mt) struct Wall {
     /// Its vertices by index into the link, in an order that makes a tetrahedron `(v, corners)` positive.
     pub corners: [u8; 3],
     pub beyond: u32,
@@ -31,7 +31,7 @@ pub(super) struct Wall {
 
 /// Scratch space for insertions and removals.
 #[derive(Clone, Debug)]
-pub(super) struct Cavity {
+pub(in crate::mt) struct Cavity {
     pub fill: CavityFill,
     pub star: Star,
     /// The slots of T_u.
@@ -80,7 +80,7 @@ impl KindState for Cavity {
     }
 }
 
-pub(super) fn take_cavity(mesh: &mut CurrentMesh) -> Box<Cavity> {
+pub(in crate::mt) fn take_cavity(mesh: &mut CurrentMesh) -> Box<Cavity> {
     mesh.take_kind_state().unwrap_or_default()
 }
 
@@ -88,7 +88,7 @@ pub(super) fn take_cavity(mesh: &mut CurrentMesh) -> Box<Cavity> {
 /// back must have the same one. So a mesh is always one that insertions alone lead to; a code that names other
 /// tetrahedra than those which were there could make ones that the rest of the mesh, if it overlaps, has already.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Fingerprint(pub u32);
+pub(in crate::mt) struct Fingerprint(pub u32);
 
 impl Fingerprint {
     /// What a vertex contributes, by its label.

@@ -18,32 +18,46 @@ impl VertexMt {
     /// # Errors
     /// If an update is no vertex insertion, or a larger one than a node can hold.
     pub fn from_explicit(mt: &ExplicitMt) -> Result<Self, ConvertError> {
-        let updates = mt.updates();
-        let children: Vec<Vec<u32>> = (0..updates).map(|u| mt.children(UpdateId(u))).collect();
-        let most_children = children.iter().map(Vec::len).max().unwrap_or(0) as u32;
-        let info = MtInfo { kind: MtKind::Vertex, updates, ..mt.info().clone() };
-        let base_removers: Vec<u32> =
-            mt.base_tets().map(|t| mt.removed_by(t).map_or(NONE, |u| u.0)).collect();
-        let base = mt.base().clone();
-        let mut compact =
-            Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32), mt.always_grows)
-                .map_err(damaged)?;
-        if let Some(quarterings) = mt.quarterings() {
-            let base = quarterings[..mt.base_tets().len()].to_vec();
-            compact = compact.with_tet_errors(base).map_err(damaged)?;
-        }
-        let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
-        let mut writer = Writer { mt, children: &children, fill: Box::default() };
-        for u in (0..updates).map(UpdateId) {
-            let node = writer.node(&compact, u, &mut boundary)?;
-            compact.push(&node, mt.errors(u)).map_err(damaged)?;
+        let children = children_of_all(mt);
+        let mut compact = Self::without_updates(mt, &children)?;
+        let parents = |u: u32| mt.parents(UpdateId(u));
+        let mut writer = Writer::new(mt, &children, &parents);
+        for u in (0..mt.updates()).map(UpdateId) {
+            let canonical = writer.canonical(u, compact.vertex(u))?;
+            let mut bits = Bits::default();
+            writer.write_vertex(&mut bits, &compact, u);
+            writer.write_links(&mut bits, &compact, u);
+            writer.write_shape(&mut bits, &compact, u, &canonical)?;
+            compact.push(&NodeBits(bits), mt.errors(u)).map_err(damaged)?;
             compact.set_own_fall(u, mt.own_fall(u));
         }
         Ok(compact)
     }
+
+    /// With the base mesh of an explicit MT, what removes that, and room for so many children.
+    pub(in crate::mt) fn without_updates(
+        mt: &ExplicitMt,
+        children: &[Vec<u32>],
+    ) -> Result<Self, ConvertError> {
+        let most_children = children.iter().map(Vec::len).max().unwrap_or(0) as u32;
+        let info = MtInfo { kind: MtKind::Vertex, updates: mt.updates(), ..mt.info().clone() };
+        let base_removers: Vec<u32> =
+            mt.base_tets().map(|t| mt.removed_by(t).map_or(NONE, |u| u.0)).collect();
+        let base = mt.base().clone();
+        let compact =
+            Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32), mt.always_grows)
+                .map_err(damaged)?;
+        let Some(quarterings) = mt.quarterings() else { return Ok(compact) };
+        compact.with_tet_errors(quarterings[..mt.base_tets().len()].to_vec()).map_err(damaged)
+    }
 }
 
-fn damaged(error: UpdateError) -> ConvertError {
+/// The children of each update.
+pub(in crate::mt) fn children_of_all(mt: &ExplicitMt) -> Vec<Vec<u32>> {
+    (0..mt.updates()).map(|u| mt.children(UpdateId(u))).collect()
+}
+
+pub(in crate::mt) fn damaged(error: UpdateError) -> ConvertError {
     ConvertError::Damaged(ReplayError::Update(error))
 }
 
@@ -65,9 +79,14 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face
 }
 
-struct Writer<'a> {
+/// Writes the updates of an explicit MT as nodes, in their order.
+pub(in crate::mt) struct Writer<'a> {
     mt: &'a ExplicitMt,
     children: &'a [Vec<u32>],
+    /// The parents of an update, in the order of its loop.
+    parents: &'a dyn Fn(u32) -> &'a [u32],
+    /// The faces that only one tetrahedron has, in the mesh of the updates so far.
+    boundary: HashSet<[u32; 3]>,
     fill: Box<CavityFill>,
 }
 
@@ -83,30 +102,24 @@ pub(in crate::mt) struct Canonical {
     pub bare: Vec<([u32; 3], bool)>,
 }
 
-impl Writer<'_> {
-    fn node(
-        &mut self,
-        compact: &VertexMt,
-        u: UpdateId,
-        boundary: &mut HashSet<[u32; 3]>,
-    ) -> Result<NodeBits, ConvertError> {
+impl<'a> Writer<'a> {
+    pub fn new(mt: &'a ExplicitMt, children: &'a [Vec<u32>], parents: &'a dyn Fn(u32) -> &'a [u32]) -> Self {
+        Self { mt, children, parents, boundary: boundary_faces(mt), fill: Box::default() }
+    }
+
+    pub fn write_vertex(&self, bits: &mut Bits, compact: &VertexMt, u: UpdateId) {
         let vertex = compact.vertex(u);
-        let canonical = self.canonical(u, vertex, boundary)?;
-        let mut bits = Bits::default();
         for x in self.mt.position(vertex) {
             bits.push(x as u64, compact.widths.position);
         }
         for (&level, field) in self.mt.levels(vertex).iter().zip(&compact.info().fields) {
             bits.push(level as u64, field.bits);
         }
-        self.write_links(&mut bits, compact, u);
-        self.write_shape(&mut bits, compact, u, &canonical)?;
-        Ok(NodeBits(bits))
     }
 
     /// The link that comes behind member `at` of the loop of `owner`, where 0 is the owner and `i` its `i`-th parent.
     fn next_in_loop(&self, owner: u32, at: usize) -> [u32; 2] {
-        match self.mt.parents(UpdateId(owner)).get(at) {
+        match (self.parents)(owner).get(at) {
             Some(&parent) => [parent, 1 + self.place_of_child(parent, owner)],
             None => [owner, 0],
         }
@@ -116,13 +129,13 @@ impl Writer<'_> {
         self.children[parent as usize].partition_point(|&c| c < child) as u32
     }
 
-    fn write_links(&self, bits: &mut Bits, compact: &VertexMt, u: UpdateId) {
+    pub fn write_links(&self, bits: &mut Bits, compact: &VertexMt, u: UpdateId) {
         let widths = compact.widths;
         let children = &self.children[u.0 as usize];
         bits.push(children.len() as u64, widths.link);
         let own = self.next_in_loop(u.0, 0);
         let of_children = children.iter().map(|&child| {
-            let at = self.mt.parents(UpdateId(child)).partition_point(|&p| p < u.0);
+            let at = (self.parents)(child).iter().take_while(|&&p| p != u.0).count();
             self.next_in_loop(child, at + 1)
         });
         for [node, link] in std::iter::once(own).chain(of_children) {
@@ -131,13 +144,8 @@ impl Writer<'_> {
         }
     }
 
-    /// Finds canonical numbers and checks that the update is an insertion that fits a node. Moves `boundary` on.
-    fn canonical(
-        &self,
-        u: UpdateId,
-        vertex: VertexId,
-        boundary: &mut HashSet<[u32; 3]>,
-    ) -> Result<Canonical, ConvertError> {
+    /// Finds canonical numbers of the next update and checks that it is an insertion that fits a node.
+    pub fn canonical(&mut self, u: UpdateId, vertex: VertexId) -> Result<Canonical, ConvertError> {
         let refuse = |why| ConvertError::Update { update: u.0, why };
         let (mt, v) = (self.mt, vertex.0);
         let newest = mt.inserted(u).flat_map(|t| mt.tets()[t as usize]).max();
@@ -169,12 +177,13 @@ impl Writer<'_> {
             FACES.iter().for_each(|face| *uses.entry(sorted(face.map(|k| tet[k]))).or_default() += 1);
         }
         let kept: HashSet<[u32; 3]> = walls.iter().map(|(face, _)| sorted(*face)).collect();
-        for (face, _) in uses.into_iter().filter(|&(face, count)| count == 1 && boundary.contains(&face)) {
+        for (face, _) in uses.into_iter().filter(|&(face, count)| count == 1 && self.boundary.contains(&face))
+        {
             bare.push((face, !kept.contains(&face)));
         }
         bare.sort_unstable();
         if bare.iter().any(|(_, given_up)| *given_up) {
-            move_boundary(boundary, &bare, &walls, v);
+            move_boundary(&mut self.boundary, &bare, &walls, v);
         } else {
             bare.clear();
         }
@@ -184,6 +193,18 @@ impl Writer<'_> {
         }
         let walls = walls.iter().map(|&(face, t)| (turned(face.map(number)), t)).collect();
         Ok(Canonical { link, walls, removed, bare })
+    }
+
+    /// Appends which child removes each tetrahedron of the star, counted from 1, with its quarterings where there are such.
+    pub fn write_removers(&self, bits: &mut Bits, compact: &VertexMt, u: UpdateId, canonical: &Canonical) {
+        let children = &self.children[u.0 as usize];
+        let own = compact.quartering_bits(children.len() as u32);
+        for (_, t) in &canonical.walls {
+            let remover = self.mt.removed_by(*t);
+            let child = remover.map_or(0, |c| 1 + self.place_of_child(u.0, c.0));
+            bits.push(u64::from(child), width_of(children.len() as u32));
+            bits.push(u64::from(self.mt.quarterings_of(*t)), own);
+        }
     }
 
     fn write_shape(
@@ -197,14 +218,7 @@ impl Writer<'_> {
         let on_boundary = !given_up.is_empty();
         write_given_up(bits, canonical.removed.len(), &given_up)
             .ok_or(ConvertError::Update { update: u.0, why: "it has too many faces on the boundary" })?;
-        let children = &self.children[u.0 as usize];
-        let own = compact.quartering_bits(children.len() as u32);
-        for (_, t) in &canonical.walls {
-            let remover = self.mt.removed_by(*t);
-            let child = remover.map_or(0, |c| 1 + children.partition_point(|&x| x < c.0));
-            bits.push(child as u64, width_of(children.len() as u32));
-            bits.push(u64::from(self.mt.quarterings_of(*t)), own);
-        }
+        self.write_removers(bits, compact, u, canonical);
         let torn = ConvertError::Update { update: u.0, why: "it does not fill the hole that it leaves" };
         let Canonical { link, walls, removed, .. } = canonical;
         let spheres = || Spheres::of(link.iter().map(|&v| self.mt.position(VertexId(v))));

@@ -2,14 +2,14 @@
 
 use super::border;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{CurrentMesh, Mt, MultiTessellation};
+use tetralod::mt::{CurrentMesh, MultiTessellation};
 
 type Point = [f64; 3];
 
 /// Asserts that the field at every vertex of the reference mesh, where the input has it, is within `epsilon` (or what the
 /// lattices round off, where that is more): in a tetrahedron around it, or at a place of the boundary so near that its
 /// distance is worth no more.
-pub fn assert_within(reference: &TetMesh, mt: &Mt, mesh: &CurrentMesh, epsilon: f64) {
+pub fn assert_within(reference: &TetMesh, mt: &impl MultiTessellation, mesh: &CurrentMesh, epsilon: f64) {
     let info = mt.info();
     let rounding = (0..info.fields.len()).map(|f| info.floor(f)).fold(0.0, f64::max);
     let allowed = epsilon.max(rounding) + 1e-9;

@@ -155,7 +155,7 @@ impl Subject {
     }
 
     /// Asserts that the mesh is Σ_S, of an MT of which only the updates before `known` have arrived.
-    pub fn assert_is(&self, mt: &Mt, mesh: &CurrentMesh, set: &[bool]) {
+    pub fn assert_is(&self, mt: &impl ApplyUpdates, mesh: &CurrentMesh, set: &[bool]) {
         assert_eq!(mesh.check(), Ok(()));
         let explicit = &self.explicit;
         let wanted = explicit.extract(set).expect("a consistent set");
