@@ -111,7 +111,7 @@
 //!
 //! | term | meaning |
 //! |---|---|
-//! | *kind* of an MT | [`edge`](mt::EdgeMt): vertex splits, undone by edge collapses to midpoints [§4]; [`vertex`](mt::VertexMt): vertex insertions [§5]; [`half-edge`](mt::HalfEdgeMt): vertex insertions, undone by half-edge collapses, whose blocks can be used by themselves; [`explicit`](mt::ExplicitMt): updates of any kind in the explicit structure |
+//! | *kind* of an MT | [`edge`](mt::EdgeMt): vertex splits, undone by edge collapses to midpoints [§4]; [`vertex`](mt::VertexMt): vertex insertions [§5], whose nodes are ours (those of the paper: [`VertexTreeMt`](mt::VertexTreeMt), in memory); [`half-edge`](mt::HalfEdgeMt): vertex insertions, undone by half-edge collapses, whose blocks can be used by themselves; [`explicit`](mt::ExplicitMt): updates of any kind in the explicit structure |
 //! | *method*, *criterion* | how an MT is built: by collapses, decimation or insertion; which vertex goes where or comes next |
 //! | *store* | what holds the updates of an MT of one kind in memory |
 //! | *remover*, *creator* of a tetrahedron | the update whose `u+` removes it; the one whose `u+` inserted it |

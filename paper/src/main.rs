@@ -9,6 +9,7 @@ mod figure8;
 mod figures;
 mod markdown;
 mod model;
+mod node_code;
 mod own;
 #[cfg(feature = "pictures")]
 mod pictures;
@@ -31,6 +32,9 @@ use crate::table1::Row;
 
 /// Points along an edge of the generated bucky ball, as many as Smallbucky has.
 const SIZE: u32 = 33;
+
+/// A data set so small that a test makes its rows again and compares them with the page in the repository.
+const SMALL: (&str, u32) = ("bucky, 9³ points", 9);
 
 /// What the page is made of.
 pub struct Findings {
@@ -111,10 +115,17 @@ fn findings(name: &str, mesh: &TetMesh, data: Option<&Path>) -> Result<Findings>
     let own = own::own(&bucky)?;
     let at_zero = figures::at_zero(&bucky)?;
     drop(bucky);
+    rows.extend(table1::rows(&small()?)?);
     let (missing, scan) = others(data, &mut rows)?;
     let findings =
         Findings { rows, missing, figure_6, figure_7, uniform, variable, own, boxes, at_zero, scan };
     Ok(findings)
+}
+
+fn small() -> Result<DataSet> {
+    let (name, size) = SMALL;
+    let others = [Recipe::InsertOwn, Recipe::Edge, Recipe::Delaunay, Recipe::HalfEdge];
+    DataSet::by_insertion(name, &tetralod::generate::bucky(size)?, &others)
 }
 
 /// Adds the rows of the data sets that have to be there already, one in memory at a time; gives those that are not, and the
@@ -180,7 +191,7 @@ mod tests {
     fn a_small_volume_gives_a_page() {
         let mesh = tetralod::generate::bucky(9).unwrap();
         let all = findings("small", &mesh, None).unwrap();
-        assert_eq!(all.rows.len(), Recipe::ALL.len());
+        assert_eq!(all.rows.len(), 2 * Recipe::ALL.len());
         for curves in [&all.uniform, &all.variable] {
             // At error 0 a uniform mesh is the reference mesh, and a larger error never needs more.
             let whole = |sizes: &Vec<u64>| curves.variable || sizes[0] == curves.reference;
@@ -193,5 +204,18 @@ mod tests {
         let page = report::page(&all);
         assert_eq!(page.matches(table1::NOT_HERE).count(), 2 * 3, "three data sets in two tables");
         assert_eq!(page, report::page(&findings("small", &mesh, None).unwrap()), "the same on every run");
+    }
+
+    /// So the page is not older than the builders and structures that it is of.
+    #[test]
+    fn the_page_in_the_repository_has_the_rows_of_this_code() {
+        let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/paper.md");
+        let page = fs::read_to_string(page).unwrap();
+        let rows = table1::rows(&small().unwrap()).unwrap();
+        let tables = [table1::storage(&rows, &[]), table1::structure(&rows, &[]), node_code::table(&rows)];
+        let lines = tables.iter().flat_map(|table| table.lines()).filter(|line| line.contains(SMALL.0));
+        let missing: Vec<&str> = lines.clone().filter(|line| !page.contains(line)).collect();
+        assert_eq!(missing, [""; 0], "docs/paper.md is out of date: run `cargo xtask paper`");
+        assert_eq!(lines.count(), 2 * (Recipe::ALL.len() + 3) + 3, "three vertex-based MTs in both codes");
     }
 }

@@ -6,6 +6,7 @@ use tetralod::mt::{Mt, MtStats, stats};
 
 use crate::markdown::{Table, count};
 use crate::model::{DataSet, Recipe};
+use crate::node_code::NodeCodes;
 use crate::published;
 use crate::published::PublishedMt;
 
@@ -14,22 +15,31 @@ pub struct Row {
     pub data: String,
     pub recipe: Recipe,
     pub stats: MtStats,
-    /// Bits that describe shapes, per node; only vertex-based MTs have them.
-    pub shape_bits: Option<f64>,
+    /// Bits of all nodes that describe shapes; only vertex-based MTs have them.
+    pub shape_bits: Option<u64>,
+    /// The same nodes in the paper's code; only of vertex-based MTs whose tetrahedra have no errors of their own.
+    pub codes: Option<NodeCodes>,
     pub file_bytes: u64,
+}
+
+impl Row {
+    /// Bits per node of one of the numbers of all nodes.
+    pub fn per_node(&self, bits: u64) -> f64 {
+        bits as f64 / f64::from(self.stats.updates.max(1))
+    }
 }
 
 /// The rows of a data set.
 pub fn rows(data: &DataSet) -> Result<Vec<Row>> {
     let row = |model: &crate::model::Model| -> Result<Row> {
         let stats = stats(&model.mt)?;
-        let nodes = f64::from(stats.updates.max(1));
         let shape_bits = match &model.mt {
-            Mt::Vertex(mt) => Some(mt.shape_bits() as f64 / nodes),
+            Mt::Vertex(mt) => Some(mt.shape_bits()),
             _ => None,
         };
+        let codes = NodeCodes::of(&model.mt)?;
         let file_bytes = encode(&model.mt, &EncodeOptions::default())?.len() as u64;
-        Ok(Row { data: data.name.clone(), recipe: model.recipe, stats, shape_bits, file_bytes })
+        Ok(Row { data: data.name.clone(), recipe: model.recipe, stats, shape_bits, codes, file_bytes })
     };
     data.models.iter().map(row).collect()
 }
@@ -83,18 +93,27 @@ pub fn storage(rows: &[Row], missing: &[&str]) -> String {
         let names = ["*paper:* Smallbucky".to_owned(), format!("*{}*", theirs.kind)];
         table.row(&[&names[..], &bytes.cells()[..]].concat());
     }
-    for Row { data, recipe, stats, file_bytes, .. } in rows {
-        let bytes = Bytes {
+    for Row { data, recipe, stats, codes, file_bytes, .. } in rows {
+        let bytes = |compact| Bytes {
             explicit: stats.explicit_bytes,
-            compact: stats.compact_bytes,
+            compact,
             indexed: stats.indexed_bytes,
             adjacency: stats.adjacency_bytes,
         };
         let names = [data.clone(), recipe.name().to_owned()];
-        table.row(&[&names[..], &bytes.cells()[..], &[count(*file_bytes)]].concat());
+        let ours = bytes(stats.compact_bytes).cells();
+        table.row(&[&names[..], &ours[..], &[count(*file_bytes)]].concat());
+        if let Some(trees) = codes.as_ref().map(NodeCodes::of_the_paper) {
+            let names = [data.clone(), in_the_papers_code(*recipe)];
+            table.row(&[&names[..], &bytes(trees.bytes).cells()[..]].concat());
+        }
     }
     missing.iter().for_each(|name| table.row(&[(*name).to_owned(), NOT_HERE.to_owned()]));
     table.finish()
+}
+
+fn in_the_papers_code(recipe: Recipe) -> String {
+    format!("{}; nodes of §5", recipe.name())
 }
 
 /// What stands in the place of data that was not there.
@@ -114,7 +133,6 @@ pub fn structure(rows: &[Row], missing: &[&str]) -> String {
         "arcs a node",
         "depth",
         "shape bits a node",
-        "by the paper's code",
         "compact bytes ÷ n",
     ];
     let mut table = Table::new(&heads, 2);
@@ -122,31 +140,34 @@ pub fn structure(rows: &[Row], missing: &[&str]) -> String {
         table.row(&published_structure(theirs));
     }
     let one = |x: f64| format!("{x:.1}");
-    for Row { data, recipe, stats, shape_bits, .. } in rows {
-        let n = f64::from(stats.vertices.max(1));
-        table.row(&[
-            data.clone(),
-            recipe.name().to_owned(),
-            count(stats.vertices),
-            count(stats.tetrahedra),
-            count(stats.mt_tetrahedra - stats.inserted),
-            one(stats.mt_tetrahedra as f64 / n),
-            one(stats.inserted_per_update()),
-            one(stats.removed_per_update()),
-            one(stats.arcs_per_update()),
-            count(stats.depth),
-            shape_bits.map_or(String::new(), one),
-            shape_bits.map_or(String::new(), |_| one(bits_by_the_paper(stats))),
-            one(stats.compact_bytes as f64 / n),
-        ]);
+    for row in rows {
+        let n = f64::from(row.stats.vertices.max(1));
+        let cells = |name: String, shape_bits: Option<u64>, compact: u64| {
+            let stats = &row.stats;
+            [
+                row.data.clone(),
+                name,
+                count(stats.vertices),
+                count(stats.tetrahedra),
+                count(stats.mt_tetrahedra - stats.inserted),
+                one(stats.mt_tetrahedra as f64 / n),
+                one(stats.inserted_per_update()),
+                one(stats.removed_per_update()),
+                one(stats.arcs_per_update()),
+                count(stats.depth),
+                shape_bits.map_or(String::new(), |bits| one(row.per_node(bits))),
+                one(compact as f64 / n),
+            ]
+        };
+        table.row(&cells(row.recipe.name().to_owned(), row.shape_bits, row.stats.compact_bytes));
+        if let Some(codes) = &row.codes {
+            let trees = codes.of_the_paper();
+            let bits = trees.code_bits + codes.remover_bits;
+            table.row(&cells(in_the_papers_code(row.recipe), Some(bits), trees.bytes));
+        }
     }
     missing.iter().for_each(|name| table.row(&[(*name).to_owned(), NOT_HERE.to_owned()]));
     table.finish()
-}
-
-/// Bits a node for a seed and the tree of T_u: 12, and 6 p − q + 1 where u+ removes p tetrahedra and inserts q [§5].
-fn bits_by_the_paper(stats: &MtStats) -> f64 {
-    12.0 + 6.0 * stats.removed_per_update() - stats.inserted_per_update() + 1.0
 }
 
 /// The explicit structure by the paper's formula: 24 n + 28 m bytes [§3].
@@ -154,7 +175,7 @@ pub fn bytes_by_the_paper(vertices: u64, mt_tetrahedra: u64) -> u64 {
     24 * vertices + 28 * mt_tetrahedra
 }
 
-fn published_structure(theirs: &PublishedMt) -> [String; 13] {
+fn published_structure(theirs: &PublishedMt) -> [String; 12] {
     let n = published::VERTICES;
     let known = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.0}"));
     [
@@ -168,7 +189,6 @@ fn published_structure(theirs: &PublishedMt) -> [String; 13] {
         known(theirs.removed_per_update),
         known(theirs.arcs_per_update),
         String::new(),
-        known(theirs.shape_bits),
         known(theirs.shape_bits),
         format!("{:.1}", theirs.compact_bytes as f64 / n as f64),
     ]
