@@ -19,6 +19,7 @@ mod fixture_builds;
 mod licences;
 mod package;
 mod paper;
+mod planted;
 mod random;
 mod release;
 mod serve;
@@ -44,6 +45,8 @@ usage: cargo xtask COMMAND
                                  tests, real data, JavaScript, wasm, browsers
   release [vX.Y.Z]               check that everything can be published, as this version; publishes nothing
   random [MINUTES]               the tests with random inputs for 30 minutes, each time with another TETRALOD_SEED
+  planted [WORD...]              plant faults in a copy of the library, all or those with a word in their names or files: a
+                                 test has to find each
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
   bench --kinds [--large]        measure triangulation, insertion and the kinds of MT side by side
   bench --all                    measure all of the following: writes docs/benchmarks.md and docs/beside-vtk.md. Takes hours
@@ -78,6 +81,7 @@ fn run() -> Result<()> {
         "test" => suite::run(rest),
         "bench" => bench::run(rest),
         "paper" => paper::run(rest),
+        "planted" => planted::run(rest),
         "random" => random::run(rest),
         "release" => release::run(rest),
         other => bail!("there is no command `{other}`\n{USAGE}"),
