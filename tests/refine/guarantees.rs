@@ -5,7 +5,7 @@
 //! print (`--nocapture`) are those of how accurate isosurfaces are and of how many updates the partial order forces.
 
 use crate::support::conformance::{
-    DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, SPELLED_VERTEX, Subject, inputs,
+    DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, PAGED, SPELLED_VERTEX, Subject, inputs,
 };
 use crate::support::data::real_data;
 use crate::support::surfaces::{Interpolant, Mesh, Surface};
@@ -39,7 +39,7 @@ fn refined(mt: &Mt, request: &Request) -> Front {
 }
 
 /// A camera at `eye` that looks along `way`.
-fn view(eye: DVec3, way: DVec3, viewport: [f64; 2]) -> View {
+pub fn view(eye: DVec3, way: DVec3, viewport: [f64; 2]) -> View {
     let forward = way.normalize();
     let right = forward.cross(DVec3::Z).normalize();
     let rows = [right * (2.0 * viewport[1] / viewport[0]), right.cross(forward) * 2.0, forward, forward];
@@ -348,10 +348,17 @@ fn no_component_of_an_isosurface_is_missed() {
     }
 }
 
-/// Extracts the isosurface at a part of the range with several errors. Where the boundary may move, places that are no longer
-/// inside of the mesh cannot be held against it.
+/// Extracts the isosurface at a part of the range with several errors, from an MT of the default kind and from an edge-based one.
 fn isosurfaces(name: &str, input: &TetMesh, part: f64) {
-    let mt = EDGE.build(&TetMesh { fields: input.fields[..1].to_vec(), ..input.clone() }, None);
+    let input = TetMesh { fields: input.fields[..1].to_vec(), ..input.clone() };
+    for how in [PAGED, EDGE] {
+        isosurfaces_of(&format!("{name}, {}", how.kind.name()), how, &input, part);
+    }
+}
+
+/// Where the boundary may move, places that are no longer inside of the mesh cannot be held against it.
+fn isosurfaces_of(name: &str, how: How, input: &TetMesh, part: f64) {
+    let mt = how.build(input, None);
     let info = mt.info();
     let field = &info.fields[0];
     let iso = field.min + part * field.range();

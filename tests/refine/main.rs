@@ -2,6 +2,7 @@
 
 mod at_vertices;
 mod bounds;
+mod budgets;
 mod cameras;
 mod fields;
 mod guarantees;
@@ -10,6 +11,7 @@ mod inside;
 mod needs;
 mod orders;
 mod pages;
+mod plain_needs;
 mod random_orders;
 mod rounding;
 mod subjects;
