@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
-use tetralod::mesh::{Field, TetMesh, repair, topology};
+use tetralod::mesh::{Field, Grid, TetMesh, repair, topology};
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
 use tetralod::refine::{Front, LodCriterion, Request};
 use tetralod::verify::{self, Reference, Sample};
@@ -177,4 +177,98 @@ fn a_torn_grid_that_is_fine_enough_for_its_inside_to_go() {
         let mesh = torn(&mut random, [8, 5, 5], Diagonals::Own, missing);
         is_built_by_all(&format!("{missing:?}"), &mesh);
     }
+}
+
+/// The tetrahedra of a grid, six in each cell along the same diagonal, whose middles are to be there, in cells; then `change` may move
+/// corners of single ones.
+fn carved(cells: [u32; 3], keeps: impl Fn([f64; 3]) -> bool, change: impl FnOnce(&mut TetMesh)) -> TetMesh {
+    let grid = Grid { dims: cells.map(|n| n + 1), origin: [0.0; 3], spacing: [f64::from(STEPS); 3] };
+    let mut mesh = TetMesh::from_grid(grid, Vec::new());
+    mesh.grid = None;
+    let positions = mesh.positions.clone();
+    let middle = |tet: &[u32; 4]| {
+        [0, 1, 2].map(|k| tet.iter().map(|&v| positions[v as usize][k]).sum::<f64>() / f64::from(4 * STEPS))
+    };
+    mesh.tets.retain(|tet| keeps(middle(tet)));
+    change(&mut mesh);
+    let place = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] / f64::from(STEPS * cells[k] as i32));
+    let values = mesh.positions.iter().map(|p| hilly(place(p))).collect();
+    mesh.fields.push(Field::new("f", values));
+    repair(mesh).expect("cells of a grid").0
+}
+
+/// Cuts a mesh through at so many cells along the first axis, but for one triangle.
+fn open_all_but_one_triangle(mesh: &mut TetMesh, at: u32, cells: [u32; 3]) {
+    let plane = f64::from(STEPS * at as i32);
+    let middle = [1, 2].map(|k: usize| f64::from(STEPS * (cells[k] / 2) as i32));
+    let is_kept = |p: &[f64; 3]| {
+        let [y, z] = [p[1] - middle[0], p[2] - middle[1]].map(|d| d / f64::from(STEPS));
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].contains(&[y, z])
+    };
+    let mut doubles = std::collections::BTreeMap::new();
+    for t in 0..mesh.tets.len() {
+        let is_behind =
+            mesh.tets[t].iter().any(|&v| mesh.positions[v as usize][0] > plane + 0.5 * f64::from(STEPS));
+        for corner in (0..4).filter(|_| is_behind) {
+            let v = mesh.tets[t][corner];
+            let [x, y, z] = mesh.positions[v as usize];
+            if x == plane && !is_kept(&[x, y, z]) {
+                let next = mesh.positions.len() as u32;
+                mesh.tets[t][corner] = *doubles.entry(v).or_insert(next);
+                if doubles[&v] == next {
+                    mesh.positions.push([x + 0.25 * f64::from(STEPS), y, z]);
+                }
+            }
+        }
+    }
+}
+
+/// Whether a place is in the half of a cell, in the third and fourth place along two axes, that is a prism on a triangle.
+fn in_prism([x, y, _]: [f64; 3], [i, j]: [f64; 2]) -> bool {
+    x.floor() == i && y.floor() == j && x - i > y - j
+}
+
+#[test]
+fn necks_of_one_triangle() {
+    let cells = [6, 4, 4];
+    is_built_by_all(
+        "a triangle between two blocks",
+        &carved(cells, |_| true, |mesh| open_all_but_one_triangle(mesh, 3, cells)),
+    );
+    let bar = |p: [f64; 3]| p[2] < 2.0 || p[2] > 5.0 || in_prism(p, [1.0, 1.0]);
+    is_built_by_all("a bar between two blocks", &carved([3, 3, 7], bar, |_| ()));
+}
+
+#[test]
+fn tunnels_of_three_edges() {
+    let through = |p: [f64; 3]| !in_prism(p, [2.0, 1.0]);
+    is_built_by_all("a tunnel through a block", &carved([5, 4, 4], through, |_| ()));
+    let inside = |p: [f64; 3]| !in_prism(p, [2.0, 1.0]) || p[2] < 1.0 || p[2] > 4.0;
+    is_built_by_all("a hollow inside of a block", &carved([5, 4, 5], inside, |_| ()));
+}
+
+#[test]
+fn hollows_and_components_of_one_tetrahedron() {
+    let cell = |p: [f64; 3]| p.map(f64::floor);
+    let is_one = |p: [f64; 3]| {
+        in_prism(p, [2.0, 1.0]) && cell(p)[2] == 2.0 && p[0] - 2.0 > p[2] - 2.0 && p[1] - 1.0 > p[2] - 2.0
+    };
+    is_built_by_all("one tetrahedron missing", &carved([5, 4, 5], |p| !is_one(p), |_| ()));
+    // In the midst of a hollow, which it does not touch.
+    let shell = |p: [f64; 3]| p.iter().any(|&x| !(1.0..=4.0).contains(&x)) || is_one(p);
+    let apart = |mesh: &mut TetMesh| {
+        let inside = |p: [f64; 3]| p.iter().all(|&x| (1.0..=4.0).contains(&(x / f64::from(STEPS))));
+        let alone: Vec<usize> = (0..mesh.tets.len())
+            .filter(|&t| mesh.tets[t].iter().all(|&v| inside(mesh.positions[v as usize])))
+            .collect();
+        for t in alone {
+            let first = mesh.positions.len() as u32;
+            let corners = mesh.tets[t].map(|v| mesh.positions[v as usize]);
+            let centre = [0, 1, 2].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / 4.0);
+            mesh.positions
+                .extend(corners.map(|p| [0, 1, 2].map(|k| (0.75 * centre[k] + 0.25 * p[k]).round())));
+            mesh.tets[t] = [0, 1, 2, 3].map(|i| first + i);
+        }
+    };
+    is_built_by_all("a tetrahedron in a shell", &carved([5; 3], shell, apart));
 }
