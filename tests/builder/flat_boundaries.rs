@@ -96,27 +96,47 @@ fn turned(mut mesh: TetMesh) -> TetMesh {
     mesh
 }
 
-/// The volume and the area of the boundary.
-fn measures(mesh: &CurrentMesh, step: [f64; 3]) -> [f64; 2] {
-    let place = |v: u32| [0, 1, 2].map(|k| f64::from(mesh.positions()[v as usize][k]) * step[k]);
-    let (mut volume, mut area) = (0.0, 0.0);
-    for (tet, around) in mesh.tets().iter().zip(mesh.neighbors()) {
-        let [a, b, c, d] = tet.map(|v| glam::DVec3::from_array(place(v)));
-        volume += (b - a).cross(c - a).dot(d - a).abs() / 6.0;
-        for face in (0..4).filter(|&i| around[i] == NONE) {
-            let [a, b, c] = FACES[face].map(|i| [a, b, c, d][i]);
-            area += (b - a).cross(c - a).length() / 2.0;
-        }
-    }
-    [volume, area]
+/// The same the other way round.
+fn turned_back([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let [y, z] = [y * 12.0 / 13.0 + z * 5.0 / 13.0, z * 12.0 / 13.0 - y * 5.0 / 13.0];
+    [0.8 * x + 0.6 * y, 0.8 * y - 0.6 * x, z]
 }
 
+/// The boundary triangles, in the place that they had before they were turned.
+fn boundary(mt: &Mt, mesh: &CurrentMesh) -> Vec<[[f64; 3]; 3]> {
+    let place = |v: u32| turned_back(mt.info().lattice.point(mesh.positions()[v as usize]));
+    let mut triangles = Vec::new();
+    for (tet, around) in mesh.tets().iter().zip(mesh.neighbors()) {
+        let faces = (0..4).filter(|&i| around[i] == NONE);
+        triangles.extend(faces.map(|i| FACES[i].map(|k| place(tet[k]))));
+    }
+    triangles
+}
+
+/// How far the corners of a triangle are at most from the plane of `sides` that they are nearest to.
+fn away(triangle: &[[f64; 3]; 3], sides: &[&[f64]; 3]) -> f64 {
+    let from = |axis: usize, side: f64| triangle.iter().map(|p| (p[axis] - side).abs()).fold(0.0, f64::max);
+    let all = (0..3).flat_map(|axis| sides[axis].iter().map(move |&side| (axis, side)));
+    all.map(|(axis, side)| from(axis, side)).fold(f64::INFINITY, f64::min)
+}
+
+fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
+    let [a, b, c] = [a, b, c].map(glam::DVec3::from);
+    (b - a).cross(c - a).length() / 2.0
+}
+
+/// How many steps of the lattice rounding may move the boundary by, away from its planes.
+const FEW: f64 = 4.0;
+
 #[test]
-fn turned_boxes_and_notched_ones_keep_their_shape() {
+fn turned_boxes_and_notched_ones_keep_their_planes() {
     let ell = |c: [u32; 3]| c[0] < 3 || c[1] < 4;
-    for (name, mesh) in
-        [("box", blocks([7, 8, 6], &[|_| 0.0], |_| true)), ("notched", blocks([7, 8, 6], &[|_| 0.0], ell))]
-    {
+    let inner: [&[f64]; 3] = [&[0.0, 3.0 / 7.0, 1.0], &[0.0, 0.5, 1.0], &[0.0, 1.0]];
+    let outer: [&[f64]; 3] = [&[0.0, 1.0]; 3];
+    for (name, mesh, sides) in [
+        ("box", blocks([7, 8, 6], &[|_| 0.0], |_| true), outer),
+        ("notched", blocks([7, 8, 6], &[|_| 0.0], ell), inner),
+    ] {
         let mut mesh = turned(mesh);
         noise(&mut mesh, 12);
         mesh.fields[0].values[100] = 20_000.0;
@@ -126,25 +146,45 @@ fn turned_boxes_and_notched_ones_keep_their_shape() {
             (MtKind::HalfEdge, BuildCriterion::HalfEdge),
         ] {
             let mt = made(&mesh, kind, criterion);
-            let step = mt.info().lattice.step;
-            let at = |request: Request| {
+            let few = FEW * mt.info().lattice.step.into_iter().fold(0.0, f64::max);
+            let at = |error: f64| {
+                let request = Request::within(error);
                 let mut front = Front::new(&mt).expect("a valid base mesh");
                 let criterion = LodCriterion::new(mt.info(), &request);
                 front.satisfy(&mt, &criterion, request.budget).expect("a valid MT");
-                (front.mesh().tets().len(), measures(front.mesh(), step))
+                (front.mesh().tets().len(), boundary(&mt, front.mesh()))
             };
-            let (all, [volume, area]) = at(Request::within(0.0));
-            let (mut least, longest) = (all, step.into_iter().fold(0.0, f64::max));
+            let whole = |triangles: &[[[f64; 3]; 3]]| triangles.iter().map(|t| area(*t)).sum::<f64>();
+            let (all, triangles) = at(0.0);
+            let (mut least, area) = (all, whole(&triangles));
             for error in [0.01, 0.05, 0.2, 1.0, f64::INFINITY] {
-                let (count, [now, area_now]) = at(Request::within(error));
-                // A boundary that is nowhere farther than a few steps from where it was sweeps so much at most.
-                let moved = 4.0 * longest * area;
+                let (count, triangles) = at(error);
                 let what = format!("{name}, {}, error {error}, {count} tetrahedra", kind.name());
-                assert!((now - volume).abs() < moved, "{what}: a volume of {now}, not {volume}");
-                assert!((area_now - area).abs() < 0.001 * area, "{what}: an area of {area_now}, not {area}");
+                let away = triangles.iter().map(|t| away(t, &sides)).fold(0.0, f64::max);
+                assert!(away <= few, "{what}: {away} away from all planes, not {few}");
+                for p in corners(sides, name == "notched") {
+                    let beside = |q: &[f64; 3]| (0..3).all(|k| (p[k] - q[k]).abs() <= few);
+                    assert!(triangles.iter().flatten().any(beside), "{what}: the corner {p:?} is gone");
+                }
+                let now = whole(&triangles);
+                assert!((now - area).abs() < 0.001 * area, "{what}: an area of {now}, not {area}");
                 least = least.min(count);
             }
             assert!(4 * least < all, "{name}, {}: {least} of {all} tetrahedra are left", kind.name());
         }
     }
+}
+
+/// The corners of a box, or of one that is notched.
+fn corners([x, y, z]: [&[f64]; 3], is_notched: bool) -> Vec<[f64; 3]> {
+    let all = x.iter().flat_map(|&x| y.iter().flat_map(move |&y| z.iter().map(move |&z| [x, y, z])));
+    // Of the inner places along a side only those are corners at which the notch begins and ends.
+    let inside = |x: f64| x > 0.0 && x < 1.0;
+    let is_corner = |p: &[f64; 3]| match (inside(p[0]), inside(p[1])) {
+        (true, true) => true,
+        (true, false) => p[1] == 1.0,
+        (false, true) => p[0] == 1.0,
+        (false, false) => !is_notched || p[0] == 0.0 || p[1] == 0.0,
+    };
+    all.filter(is_corner).collect()
 }
