@@ -2,7 +2,7 @@
 
 use crate::support::meshes::{bent, blocks, built, cube, hilly, linear};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildError, FieldPrecision, edge_mt};
+use tetralod::builder::{BuildConfig, BuildError, FieldPrecision, build, edge_mt};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::orient3d;
 use tetralod::mesh::TetMesh;
@@ -148,12 +148,16 @@ fn a_larger_budget_is_never_worse() {
 
 #[test]
 fn errors_fall_and_are_never_zero() {
-    let mt = built(&cube(5, &[|_| 7.0])).mt;
-    assert!(mt.updates() > 100);
-    // Error 0 means the reference mesh, even where a coarser one is as good.
-    assert!((0..mt.updates()).all(|u| mt.error(UpdateId(u)).error() > 0.0));
-    // They never grow from an update to those that depend on it.
-    assert_eq!(check_errors(&mt), Ok(None));
+    for kind in MtKind::ALL {
+        let config = BuildConfig::of(kind);
+        let built = build(&cube(5, &[|_| 7.0]), &config, &mut |_| ControlFlow::Continue(()));
+        let mt = built.expect("a valid mesh").mt;
+        assert!(mt.updates() > 100);
+        // Error 0 means the reference mesh, even where a coarser one is as good.
+        assert!((0..mt.updates()).all(|u| mt.error(UpdateId(u)).error() > 0.0), "{}", kind.name());
+        // They never grow from an update to those that depend on it.
+        assert_eq!(check_errors(&mt), Ok(None), "{}", kind.name());
+    }
 }
 
 #[test]
