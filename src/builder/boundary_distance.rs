@@ -1,8 +1,13 @@
 //! The boundary of the reference mesh, and how far a point is from it.
 
+use super::triangle_fan::TriangleFan;
 use crate::geom::{Groups, nearest_on_triangle};
 use crate::mesh::boundary_faces;
+use foldhash::HashMap;
 use glam::DVec3;
+
+/// Of vertices with more triangles than this not all are looked at.
+const MANY: usize = 64;
 
 /// The boundary triangles of the reference mesh, in model units.
 pub(super) struct BoundaryDistance {
@@ -10,6 +15,11 @@ pub(super) struct BoundaryDistance {
     corners: Vec<[u32; 3]>,
     /// The triangles at each vertex.
     around: Groups,
+    /// Those at the vertices with [`MANY`].
+    fans: HashMap<u32, TriangleFan>,
+    /// How many triangles were compared with a point.
+    #[cfg(test)]
+    pub compared: std::sync::atomic::AtomicU64,
 }
 
 impl BoundaryDistance {
@@ -20,11 +30,27 @@ impl BoundaryDistance {
 
     /// Of these triangles, counter-clockwise when seen from outside.
     pub fn of(corners: Vec<[u32; 3]>, positions: &[DVec3]) -> Self {
-        let triangles = corners.iter().map(|face| face.map(|v| positions[v as usize])).collect();
+        let triangles: Vec<_> = corners.iter().map(|face| face.map(|v| positions[v as usize])).collect();
         let around = Groups::new(positions.len(), |add| {
             (0..).zip(&corners).for_each(|(t, face)| face.iter().for_each(|v| add(*v as usize, t)));
         });
-        Self { triangles, corners, around }
+        let fan = |v: u32| {
+            let others = |t: u32| {
+                let first = corners[t as usize].iter().position(|&corner| corner == v).unwrap_or(0);
+                [1, 2].map(|k| triangles[t as usize][(first + k) % 3])
+            };
+            TriangleFan::new(positions[v as usize], around.of(v as usize), others)
+        };
+        let with_many = (0..positions.len() as u32).filter(|&v| around.of(v as usize).len() > MANY);
+        let fans = with_many.map(|v| (v, fan(v))).collect();
+        Self {
+            triangles,
+            corners,
+            around,
+            fans,
+            #[cfg(test)]
+            compared: std::sync::atomic::AtomicU64::new(0),
+        }
     }
 
     /// All triangles.
@@ -46,22 +72,38 @@ impl BoundaryDistance {
     /// Walks from a triangle to ever nearer ones, until one is as near as `enough`. Returns the last one and
     /// its distance from `p`: an upper bound of how far `p` is from the boundary.
     pub fn walk(&self, p: DVec3, from: u32, enough: f64) -> (u32, f64) {
-        let squared = |t: u32| p.distance_squared(nearest_on_triangle(p, self.triangles[t as usize]));
-        let (mut best, mut least) = (from, squared(from));
+        let (mut best, mut least) = (from, self.squared(p, from));
         while least > enough * enough {
             let here = best;
             for &v in &self.corners[here as usize] {
-                for &t in self.at(v) {
-                    let distance = squared(t);
-                    if distance < least {
-                        (best, least) = (t, distance);
-                    }
-                }
+                (best, least) = self.nearer(p, v, (best, least));
             }
             if best == here {
                 break;
             }
         }
         (best, least.sqrt())
+    }
+
+    /// The triangle at a vertex that is nearest to `p`, the first one of several, and the square of its distance, if that is less than
+    /// the one of `known`; else `known`.
+    fn nearer(&self, p: DVec3, v: u32, known: (u32, f64)) -> (u32, f64) {
+        let all = self.at(v);
+        if all.len() > MANY
+            && let Some(fan) = self.fans.get(&v)
+        {
+            return fan.nearer(p, known, |t| self.squared(p, t));
+        }
+        all.iter().fold(known, |known, &t| {
+            let squared = self.squared(p, t);
+            if squared < known.1 { (t, squared) } else { known }
+        })
+    }
+
+    /// The square of how far `p` is from a triangle.
+    fn squared(&self, p: DVec3, triangle: u32) -> f64 {
+        #[cfg(test)]
+        self.compared.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        p.distance_squared(nearest_on_triangle(p, self.triangles[triangle as usize]))
     }
 }

@@ -66,6 +66,7 @@ mod searches;
 mod sequence;
 mod sides;
 mod squares;
+mod triangle_fan;
 mod vertex;
 mod work_mesh;
 

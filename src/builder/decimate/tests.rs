@@ -17,6 +17,7 @@ use glam::{DMat3, DVec3};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
 
 const CRITERIA: [BuildCriterion; 2] = [BuildCriterion::HalfEdge, BuildCriterion::Delaunay];
 
@@ -691,4 +692,39 @@ fn the_number_of_threads_does_not_matter() {
             .into_iter()
             .for_each(|threads| assert!(of(threads) == one, "{criterion:?} {purpose:?} {threads}"));
     }
+}
+
+/// So many tetrahedra around one edge, of which each has a face of its own on both sides.
+fn around_an_edge(count: u32) -> TetMesh {
+    let rim = (0..count).map(|i| {
+        let angle = f64::from(i) / f64::from(count) * std::f64::consts::TAU;
+        [angle.cos(), angle.sin(), 0.2 * (5.0 * angle).cos()]
+    });
+    let positions: Vec<[f64; 3]> = [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]].into_iter().chain(rim).collect();
+    let values = positions.iter().map(|p| hilly(*p)).collect();
+    let tets = (0..count).map(|i| [0, 1, 2 + i, 2 + (i + 1) % count]).collect();
+    let mesh = TetMesh { positions, tets, fields: vec![Field::new("hilly", values)], ..TetMesh::default() };
+    repair(mesh).expect("a ring").0
+}
+
+/// Work is counted, not time: each triangle of the boundary that a point is compared with.
+#[test]
+fn tetrahedra_around_one_edge_take_as_much_work_each_as_fewer() {
+    let compared = |count: u32| {
+        let mesh = around_an_edge(count);
+        let quantized = quantize::quantize(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
+        let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
+        let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
+        let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
+        let levels = Levels::of_purpose(Purpose::Uniform);
+        let state = State::new(work, reference, topology.non_manifold, levels);
+        let mut record = Sequence::default();
+        let mut decimator = Decimator::new(state, None, &mut record);
+        decimator.remove_all(&mut |_| ControlFlow::Continue(())).expect("not stopped");
+        assert!(decimator.state.mesh.live() < count / 8, "most of them are removed");
+        decimator.state.reference.boundary.compared.load(Ordering::Relaxed)
+    };
+    let [few, many] = [500, 2000].map(compared);
+    // With each of a star it would be sixteen times as many.
+    assert!(many < 8 * few, "{few} comparisons for 500 tetrahedra, {many} for 2000");
 }
