@@ -9,6 +9,7 @@
 use super::places::Places;
 use super::points::SparseLists;
 use glam::DVec3;
+use std::ops::RangeInclusive;
 
 /// The reference vertices outside of the tetrahedra in whose buckets they are.
 pub(super) struct OutsidePoints {
@@ -21,6 +22,7 @@ pub(super) struct OutsidePoints {
     grid: Grid,
     /// All that have ever been outside, by cell of the grid.
     cells: SparseLists,
+    occupied: Occupied,
     known: Vec<bool>,
 }
 
@@ -34,7 +36,14 @@ struct Grid {
 }
 
 /// The most cells along an axis.
-const MOST_CELLS: usize = 128;
+const MOST_CELLS: usize = u128::BITS as usize;
+
+/// Which cells of the grid have any: a long box may lie over very many without.
+struct Occupied {
+    /// Of each layer the rows, and of each row the cells.
+    layers: Vec<u128>,
+    rows: Vec<u128>,
+}
 
 impl OutsidePoints {
     /// Of a mesh with vertices at these places.
@@ -47,6 +56,7 @@ impl OutsidePoints {
             foreign: SparseLists::default(),
             cells: SparseLists::default(),
             known: vec![false; points],
+            occupied: Occupied::new(grid.cells),
             grid,
         }
     }
@@ -65,9 +75,10 @@ impl OutsidePoints {
     /// The vertices between two corners of a box that no tetrahedron contains.
     fn between(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = u32> {
         let [from, to] = [low, high].map(|p| self.grid.cell(p));
-        let rows = (from[0]..=to[0]).flat_map(move |x| (from[1]..=to[1]).map(move |y| self.grid.row(x, y)));
-        let cells = rows.flat_map(move |row| row + from[2]..=row + to[2]);
-        let all = cells.flat_map(|cell| self.cells.iter(cell as u32));
+        let all = self
+            .occupied
+            .between(from, to)
+            .flat_map(|[x, y, z]| self.cells.iter(self.grid.number([x, y, z])));
         all.filter(move |&point| {
             let place = self.grid.places.at(point);
             let is_inside = place.cmpge(low).all() && place.cmple(high).all();
@@ -96,8 +107,9 @@ impl OutsidePoints {
     pub fn set_outside(&mut self, point: u32, outside: bool) {
         self.outside[point as usize] = outside;
         if outside && !std::mem::replace(&mut self.known[point as usize], true) {
-            let [x, y, z] = self.grid.cell(self.grid.places.at(point));
-            self.cells.put((self.grid.row(x, y) + z) as u32, point);
+            let cell = self.grid.cell(self.grid.places.at(point));
+            self.cells.put(self.grid.number(cell), point);
+            self.occupied.add(cell);
         }
     }
 
@@ -131,10 +143,42 @@ impl Grid {
         ((place - self.low) * self.density).to_array().map(|x| x.max(0.0).min(last) as usize)
     }
 
-    /// The number of the first cell of a row.
-    fn row(&self, x: usize, y: usize) -> usize {
-        (x * self.cells + y) * self.cells
+    /// The number of a cell.
+    fn number(&self, [x, y, z]: [usize; 3]) -> u32 {
+        ((x * self.cells + y) * self.cells + z) as u32
     }
+}
+
+impl Occupied {
+    /// None of so many along each axis.
+    fn new(cells: usize) -> Self {
+        Self { layers: vec![0; cells], rows: vec![0; cells * cells] }
+    }
+
+    fn add(&mut self, [x, y, z]: [usize; 3]) {
+        let row = x * self.layers.len() + y;
+        self.layers[x] |= 1 << y;
+        self.rows[row] |= 1 << z;
+    }
+
+    /// Those between two cells, in order.
+    fn between(&self, from: [usize; 3], to: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+        let layers =
+            (from[0]..=to[0]).flat_map(move |x| bits(self.layers[x], from[1]..=to[1]).map(move |y| [x, y]));
+        layers.flat_map(move |[x, y]| {
+            bits(self.rows[x * self.layers.len() + y], from[2]..=to[2]).map(move |z| [x, y, z])
+        })
+    }
+}
+
+/// The places in this range of the bits that are set, ascending.
+fn bits(set: u128, range: RangeInclusive<usize>) -> impl Iterator<Item = usize> {
+    let mut left = set & u128::MAX >> (MOST_CELLS - 1 - range.end()) & u128::MAX << range.start();
+    std::iter::from_fn(move || {
+        let first = (left != 0).then(|| left.trailing_zeros() as usize)?;
+        left &= left - 1;
+        Some(first)
+    })
 }
 
 #[cfg(test)]
