@@ -2,6 +2,8 @@
 
 use super::{Groups, nearest_on_triangle};
 use glam::DVec3;
+use std::borrow::Cow;
+use std::ops::RangeInclusive;
 
 /// Triangles sorted into the cells of a regular grid.
 pub(crate) struct TriangleGrid {
@@ -15,6 +17,9 @@ pub(crate) struct TriangleGrid {
 /// Most cells along an axis.
 const MAX_CELLS: f64 = 128.0;
 
+/// So much of a cell around it counts as inside, far more than the rounding of a place.
+const MARGIN: f64 = 1.0 / 64.0;
+
 impl TriangleGrid {
     pub fn new(corners: Vec<[DVec3; 3]>) -> Self {
         let mut low = DVec3::INFINITY;
@@ -27,24 +32,52 @@ impl TriangleGrid {
         let cells = extent.to_array().map(|e| (e / side).clamp(0.0, MAX_CELLS) as usize + 1);
         let mut grid = Self { corners, low, side, cells, in_cell: Groups::default() };
         grid.in_cell = Groups::new(cells.iter().product(), |add| {
-            for (i, [a, b, c]) in (0..).zip(&grid.corners) {
-                grid.cells_between(a.min(*b).min(*c), a.max(*b).max(*c), |cell| {
-                    add(cell, i);
-                    false
-                });
-            }
+            (0..).zip(&grid.corners).for_each(|(i, corners)| grid.cells_of(corners, |cell| add(cell, i)));
         });
         grid
     }
 
+    /// Visits the cells that a triangle comes into, and some beside it: of a long one far fewer than its box has.
+    fn cells_of(&self, triangle: &[DVec3; 3], mut visit: impl FnMut(usize)) {
+        for z in self.range(triangle, 2) {
+            let layer = self.part(triangle, 2, z);
+            for y in self.range(&layer, 1) {
+                let row = self.part(&layer, 1, y);
+                self.range(&row, 0).for_each(|x| visit(self.number([x, y, z])));
+            }
+        }
+    }
+
+    /// The cells along an axis that some points are between.
+    fn range(&self, points: &[DVec3], axis: usize) -> RangeInclusive<usize> {
+        let along = points.iter().map(|p| p[axis]);
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        self.along(low, axis)..=self.along(high, axis)
+    }
+
+    /// The part of a polygon in the cells of this number along an axis, and a little more: all of it where it is hardly longer.
+    fn part<'a>(&self, polygon: &'a [DVec3], axis: usize, cell: usize) -> Cow<'a, [DVec3]> {
+        let range = self.range(polygon, axis);
+        if range.end() - range.start() < 2 {
+            return Cow::Borrowed(polygon);
+        }
+        let [low, high] =
+            [cell as f64 - MARGIN, cell as f64 + 1.0 + MARGIN].map(|x| self.low[axis] + x * self.side);
+        Cow::Owned(above(&above(polygon, axis, 1.0, low), axis, -1.0, -high))
+    }
+
+    fn along(&self, x: f64, axis: usize) -> usize {
+        ((x - self.low[axis]) / self.side).clamp(0.0, (self.cells[axis] - 1) as f64) as usize
+    }
+
+    fn number(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.cells[1] + y) * self.cells[0] + x
+    }
+
     /// Visits the cells between two points until `visit` returns true; whether it did.
     fn cells_between(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(usize) -> bool) -> bool {
-        let along = |x: f64, axis: usize| {
-            ((x - self.low[axis]) / self.side).clamp(0.0, (self.cells[axis] - 1) as f64) as usize
-        };
-        let range = |axis: usize| along(low[axis], axis)..=along(high[axis], axis);
-        range(2)
-            .any(|z| range(1).any(|y| range(0).any(|x| visit((z * self.cells[1] + y) * self.cells[0] + x))))
+        let range = |axis: usize| self.along(low[axis], axis)..=self.along(high[axis], axis);
+        range(2).any(|z| range(1).any(|y| range(0).any(|x| visit(self.number([x, y, z])))))
     }
 
     /// Whether one of the triangles comes within `radius` of `p`: one that does, or else none. `first` is tried before all others.
@@ -136,5 +169,66 @@ impl TriangleGrid {
             }
             radius *= 2.0;
         }
+    }
+}
+
+/// The part of a polygon where a coordinate times `sign` is at least this.
+fn above(polygon: &[DVec3], axis: usize, sign: f64, least: f64) -> Vec<DVec3> {
+    let mut part = Vec::with_capacity(polygon.len() + 1);
+    for (i, &a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let [above_a, above_b] = [a, b].map(|p| sign * p[axis] - least);
+        if above_a >= 0.0 {
+            part.push(a);
+        }
+        if above_a * above_b < 0.0 {
+            part.push(a + (b - a) * (above_a / (above_a - above_b)));
+        }
+    }
+    part
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles from one point to a rim.
+    fn fan(count: u32) -> Vec<[DVec3; 3]> {
+        let rim = |i: u32| {
+            let angle = f64::from(i) / f64::from(count) * std::f64::consts::TAU;
+            DVec3::new(angle.cos(), angle.sin(), 0.1 * (3.0 * angle).sin())
+        };
+        (0..count).map(|i| [DVec3::Z, rim(i), rim(i + 1)]).collect()
+    }
+
+    #[test]
+    fn the_nearest_of_long_triangles_is_found() {
+        let triangles = fan(700);
+        let grid = TriangleGrid::new(triangles.clone());
+        for i in 0..1000_u32 {
+            let at = |k: u32| f64::from(i * k % 211) / 105.0 - 1.0;
+            let p = DVec3::new(at(7), at(13), at(29));
+            let squares =
+                triangles.iter().map(|&corners| p.distance_squared(nearest_on_triangle(p, corners)));
+            let (least, _) =
+                (0..).zip(squares).fold(
+                    (0, f64::INFINITY),
+                    |best: (u32, f64), (i, square)| {
+                        if square < best.1 { (i, square) } else { best }
+                    },
+                );
+            assert_eq!(grid.nearest(p).map(|(found, _)| found), Some(least), "{p}");
+        }
+    }
+
+    #[test]
+    fn long_triangles_are_in_few_cells() {
+        let listed = |count: u32| {
+            let grid = TriangleGrid::new(fan(count));
+            grid.in_cell.of_all(0..grid.cells.iter().product()).len()
+        };
+        let [few, many] = [500, 8000].map(listed);
+        // Along each there are four times as many cells.
+        assert!(many < 16 * 6 * few, "{few}, {many}");
     }
 }
