@@ -590,17 +590,15 @@ impl Triangulation {
         let mut stack = vec![first];
         let inside = self.epoch;
         self.marks[first as usize] = reached;
-        let mut found = vec![first];
         while let Some(t) = stack.pop() {
             for next in self.neighbors[t as usize] {
                 if self.marks[next as usize] == inside {
                     self.marks[next as usize] = reached;
                     stack.push(next);
-                    found.push(next);
                 }
             }
         }
-        kept.retain(|t| found.contains(t));
+        kept.retain(|&t| self.marks[t as usize] == reached);
         self.mark(kept);
     }
 

@@ -3,6 +3,7 @@
 use super::{BuildConfig, BuildError};
 use crate::mesh::{Field, TetMesh};
 use crate::mt::{Exact, VertexId};
+use std::collections::{HashMap, HashSet};
 
 /// Most fields of an MT.
 const MAX_FIELDS: usize = 255;
@@ -10,9 +11,10 @@ const MAX_FIELDS: usize = 255;
 /// The fields to keep, the time steps of each one behind the other.
 pub(super) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<&'a Field>, BuildError> {
     let mut chosen: Vec<&Field> = Vec::new();
+    let mut known = HashSet::new();
     let mut add = |field: &'a Field| {
         // A field that is named twice, by its own name and by its vector's, is kept once.
-        if !chosen.iter().any(|&c| std::ptr::eq(c, field)) {
+        if known.insert(std::ptr::from_ref(field)) {
             chosen.push(field);
         }
     };
@@ -50,13 +52,15 @@ pub(super) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<
 
 /// The fields for which `wanted` holds, in the order of the mesh, with the time steps of each field together.
 fn in_steps(mesh: &TetMesh, wanted: impl Fn(&Field) -> bool) -> Vec<&Field> {
-    let mut names: Vec<&str> = Vec::new();
+    let mut number_of: HashMap<&str, usize> = HashMap::new();
     for field in mesh.fields.iter().filter(|field| wanted(field)) {
-        if !names.contains(&field.name.as_str()) {
-            names.push(&field.name);
-        }
+        let number = number_of.len();
+        number_of.entry(&field.name).or_insert(number);
     }
-    names.into_iter().flat_map(|name| mesh.fields.iter().filter(move |field| field.name == name)).collect()
+    let number = |field: &&Field| number_of.get(field.name.as_str()).copied();
+    let mut found: Vec<&Field> = mesh.fields.iter().filter(|field| number(field).is_some()).collect();
+    found.sort_by_key(number);
+    found
 }
 
 fn unknown(mesh: &TetMesh, name: &str) -> BuildError {

@@ -6,6 +6,7 @@
 use super::places::Places;
 use super::points::{SLACK, as_vec, barycentric};
 use crate::mesh::{MeshError, NONE};
+use foldhash::HashSet;
 use glam::DVec3;
 
 /// A point of the input, and the cell on the lattice that it lies in or is least outside of.
@@ -33,7 +34,7 @@ pub(super) fn locations(
     for (t, tet) in (0..).zip(tets) {
         tet.iter().for_each(|&v| first[v as usize] = t);
     }
-    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Vec::new() };
+    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Found::default() };
     let moved = points.filter(|&point| places.is_moved(point) && first[point as usize] != NONE);
     Ok(moved.map(|point| search.locate(point, first[point as usize])).collect())
 }
@@ -51,7 +52,7 @@ pub(super) fn locations_of(
     for (t, tet) in (0..).zip(tets) {
         tet.iter().for_each(|&v| first[v as usize] = t);
     }
-    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Vec::new() };
+    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Found::default() };
     Ok(points.map(|point| search.locate(point, first[point as usize])).collect())
 }
 
@@ -80,7 +81,7 @@ pub(super) fn locations_in_piece(
     for (t, tet) in (0..).zip(tets) {
         tet.iter().for_each(|&v| first[v as usize] = t);
     }
-    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Vec::new() };
+    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Found::default() };
     let (mut located, mut beyond) = (Vec::new(), Vec::new());
     for point in (0..positions.len() as u32).filter(|&point| places.is_moved(point)) {
         // What only other pieces use is theirs.
@@ -90,7 +91,7 @@ pub(super) fn locations_in_piece(
         }
         let location = search.locate(point, first[point as usize]);
         // The search may go on behind each tetrahedron that it has found.
-        if search.found.iter().any(|&t| is_open(t)) {
+        if search.found.cells.iter().any(|&t| is_open(t)) {
             beyond.push(point);
         } else {
             located.push(location);
@@ -104,8 +105,42 @@ struct Search<'a> {
     neighbors: &'a [[u32; 4]],
     positions: &'a [[i32; 3]],
     places: &'a Places,
-    /// The cells found so far, in the order of the search.
-    found: Vec<u32>,
+    found: Found,
+}
+
+/// The cells found so far.
+#[derive(Default)]
+struct Found {
+    /// In the order of the search.
+    cells: Vec<u32>,
+    /// All of them, once they are [`MANY`].
+    set: HashSet<u32>,
+}
+
+/// Fewer cells are looked through one by one.
+const MANY: usize = 64;
+
+impl Found {
+    /// Begins anew with one cell.
+    fn start(&mut self, first: u32) {
+        if self.cells.len() >= MANY {
+            self.set = HashSet::default();
+        }
+        self.cells.clear();
+        self.cells.push(first);
+    }
+
+    /// Adds a cell unless it is there.
+    fn add(&mut self, t: u32) {
+        let is_known = if self.cells.len() < MANY { self.cells.contains(&t) } else { !self.set.insert(t) };
+        if is_known {
+            return;
+        }
+        self.cells.push(t);
+        if self.cells.len() == MANY {
+            self.set.extend(&self.cells);
+        }
+    }
 }
 
 impl Search<'_> {
@@ -113,13 +148,12 @@ impl Search<'_> {
     fn locate(&mut self, point: u32, first: u32) -> Location {
         let (place, rounded) = (self.places.at(point), as_vec(self.positions[point as usize]));
         let (low, high) = (place.min(rounded), place.max(rounded));
-        self.found.clear();
-        self.found.push(first);
+        self.found.start(first);
         let mut best = Location { point, tet: first, lambda: DVec3::ZERO, outside: true };
         let mut deepest = f64::NEG_INFINITY;
         let mut next = 0;
-        while next < self.found.len() {
-            let t = self.found[next];
+        while next < self.found.cells.len() {
+            let t = self.found.cells[next];
             next += 1;
             let corners = self.tets[t as usize].map(|v| as_vec(self.positions[v as usize]));
             let lambda = barycentric(corners) * (place - corners[0]);
@@ -137,8 +171,8 @@ impl Search<'_> {
                 let least = corners.into_iter().fold(DVec3::INFINITY, DVec3::min);
                 let most = corners.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max);
                 let is_near = least.cmple(high).all() && most.cmpge(low).all();
-                if is_near && !self.found.contains(&n) {
-                    self.found.push(n);
+                if is_near {
+                    self.found.add(n);
                 }
             }
         }
