@@ -73,16 +73,26 @@ pub(super) fn places(positions: &[[f64; 3]], mut points: Vec<u32>, distance: f64
         return places;
     }
     let mut sets = DisjointSets::of(positions.len());
-    // Cubes as large as the distance: points that are closer are in neighbouring ones.
-    let cube = |v: u32| at(v).map(|x| (x / distance).floor() as i64);
-    let mut cubes: Vec<([i64; 3], u32)> = points.iter().map(|&v| (cube(v), v)).collect();
-    cubes.sort_unstable();
-    for &([x, y, z], v) in &cubes {
-        for [x, y] in [-1, 0, 1].into_iter().flat_map(|i| [-1, 0, 1].map(|j| [x + i, y + j])) {
-            let begin = cubes.partition_point(|(cube, _)| *cube < [x, y, z - 1]);
-            let column = cubes[begin..].iter().take_while(|(cube, _)| *cube <= [x, y, z + 1]);
-            for &(_, w) in column.filter(|&&(_, w)| w > v && within(positions, v, w, distance)) {
-                sets.join(v as usize, w as usize);
+    // Cubes half as large as the distance: points in one of them are at one place, and those that are near are no more than two away.
+    let cube = |v: u32| at(v).map(|x| (x / (0.5 * distance)).floor() as i64);
+    let mut all: Vec<([i64; 3], u32)> = points.iter().map(|&v| (cube(v), v)).collect();
+    all.sort_unstable();
+    let cubes: Vec<&[([i64; 3], u32)]> = all.chunk_by(|a, b| a.0 == b.0).collect();
+    for &cube in &cubes {
+        let ([x, y, z], first) = cube[0];
+        cube.iter().for_each(|&(_, v)| sets.join(first as usize, v as usize));
+        for [i, j] in
+            (0..=2).flat_map(|i| [-2, -1, 0, 1, 2].map(|j| [i, j])).filter(|column| *column >= [0, 0])
+        {
+            let begin = cubes.partition_point(|other| other[0].0 < [x + i, y + j, z - 2]);
+            let column = cubes[begin..].iter().take_while(|other| other[0].0 <= [x + i, y + j, z + 2]);
+            for other in column {
+                let is_joined = sets.root(first as usize) == sets.root(other[0].1 as usize);
+                if !is_joined
+                    && cube.iter().any(|v| other.iter().any(|w| within(positions, v.1, w.1, distance)))
+                {
+                    sets.join(first as usize, other[0].1 as usize);
+                }
             }
         }
     }
