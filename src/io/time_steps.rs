@@ -1,5 +1,7 @@
 //! Time steps in several files, as one mesh.
 
+use std::collections::HashSet;
+
 use thiserror::Error;
 
 use crate::io::{CellData, ReadError, ReadOptions};
@@ -127,8 +129,10 @@ fn append(
     read: &mut dyn FnMut(usize, &ReadOptions) -> Result<TetMesh, ReadError>,
 ) -> Result<(), TimeStepsError> {
     let first_time = first_time.or_else(|| time_of(mesh));
-    let mut times = vec![first_time.unwrap_or(0.0)];
-    set_time(mesh, times[0]);
+    // Zero has two signs.
+    let key = |time: f64| (time + 0.0).to_bits();
+    let mut times = HashSet::from([key(first_time.unwrap_or(0.0))]);
+    set_time(mesh, first_time.unwrap_or(0.0));
     for (number, (file, time)) in later.iter().enumerate() {
         let file = || file.clone();
         let mut next = read(number + 1, options)?;
@@ -137,10 +141,9 @@ fn append(
             (None, None) => number as f64 + 1.0,
             _ => return Err(TimeStepsError::MixedTimes { file: file() }),
         };
-        if times.contains(&time) {
+        if !times.insert(key(time)) {
             return Err(TimeStepsError::SameTime { file: file(), time });
         }
-        times.push(time);
         set_time(&mut next, time);
         let same = |field: &Field| options.fields.as_ref().is_some_and(|names| names.contains(&field.name));
         next.fields.retain(same);

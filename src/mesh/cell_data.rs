@@ -1,6 +1,7 @@
 //! Fields at cells as fields at points.
 
 use crate::mesh::{Field, TetMesh};
+use std::collections::HashSet;
 
 impl TetMesh {
     /// Turns the fields at cells that have values into fields at points: the mean of the cells around a point, weighted
@@ -17,11 +18,13 @@ impl TetMesh {
             return;
         }
         let volumes = self.relative_volumes();
+        // Time steps share a name.
+        let key = |field: &Field| (field.name.clone(), field.time.map(|time| (time + 0.0).to_bits()));
+        let mut taken: HashSet<_> = self.fields.iter().map(key).collect();
         for mut field in read {
             field.values = self.mean_of_cells(&field.values, &volumes);
             field.integer = false;
-            // Time steps share a name.
-            while self.fields.iter().any(|f| f.name == field.name && f.time == field.time) {
+            while !taken.insert(key(&field)) {
                 field.name.push_str("_cells");
                 field.vector = None;
             }

@@ -1,6 +1,7 @@
 //! Time steps over one mesh.
 
-use crate::mesh::{NONE, TetMesh};
+use crate::mesh::{Field, NONE, TetMesh};
+use std::collections::HashSet;
 use thiserror::Error;
 
 /// What to do with steps over meshes that differ.
@@ -49,21 +50,26 @@ impl TetMesh {
     /// The first difference between the meshes; this one is unchanged then.
     pub fn add_step(&mut self, step: Self) -> Result<(), StepError> {
         self.same_mesh(&step)?;
-        let names = |mesh: &Self| -> Vec<(bool, String)> {
-            let points = mesh.fields.iter().map(|f| (false, f.name.clone()));
-            points.chain(mesh.cell_fields.iter().map(|f| (true, f.name.clone()))).collect()
-        };
-        let (known, new) = (names(self), names(&step));
-        let only =
-            |of: &[(bool, String)], not: &[(bool, String)]| of.iter().find(|n| !not.contains(n)).cloned();
-        if let Some((_, name)) = only(&new, &known).or_else(|| only(&known, &new)) {
-            return Err(StepError::Field { name });
+        let (known, new) = (self.names_of_a_step(), step.names_of_a_step());
+        if let Some((_, name)) = first_only_in(&new, &known).or_else(|| first_only_in(&known, &new)) {
+            return Err(StepError::Field { name: name.to_owned() });
         }
         self.fields.extend(step.fields);
         self.cell_fields.extend(step.cell_fields.into_iter().filter(|f| !f.values.is_empty()));
         let new: Vec<String> = step.notes.into_iter().filter(|note| !self.notes.contains(note)).collect();
         self.notes.extend(new);
         Ok(())
+    }
+
+    /// The names of the fields of the first time step, and whether they are at cells. Those of later steps follow.
+    fn names_of_a_step(&self) -> Vec<(bool, &str)> {
+        let of_first = |fields: &'_ [Field]| {
+            let time = fields.first().and_then(|field| field.time);
+            fields.iter().take_while(|field| field.time == time).count()
+        };
+        let [points, cells] = [&self.fields, &self.cell_fields].map(|fields| &fields[..of_first(fields)]);
+        let points = points.iter().map(|field| (false, field.name.as_str()));
+        points.chain(cells.iter().map(|field| (true, field.name.as_str()))).collect()
     }
 
     fn same_mesh(&self, step: &Self) -> Result<(), StepError> {
@@ -95,6 +101,12 @@ impl TetMesh {
         };
         first.map_or(Ok(()), |point| Err(StepError::Moved { point: point as usize }))
     }
+}
+
+/// The first of some names that is not among others.
+fn first_only_in<'a>(names: &[(bool, &'a str)], others: &[(bool, &str)]) -> Option<(bool, &'a str)> {
+    let others: HashSet<_> = others.iter().copied().collect();
+    names.iter().copied().find(|name| !others.contains(name))
 }
 
 #[cfg(test)]

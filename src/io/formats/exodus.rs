@@ -2,6 +2,8 @@
 //!
 //! The numbers of blocks become the field `block` at cells. Variables whose names differ in a last letter x, y or z are a vector.
 
+use std::collections::HashMap;
+
 use netcdf_reader::{NcFile, NcGroup, NcSliceInfo, NcSliceInfoElem, NcVariable};
 
 use crate::io::ReadOptions;
@@ -15,6 +17,8 @@ use crate::mesh::TetMesh;
 struct Reader<'a> {
     file: &'a NcFile,
     root: &'a NcGroup,
+    /// Those of the root, by their names: there may be one for each variable of each block.
+    variables: HashMap<&'a str, &'a NcVariable>,
     step: u64,
 }
 
@@ -27,8 +31,7 @@ struct Block {
 
 /// The times of the steps; none if there are no steps.
 pub(super) fn times(file: &NcFile) -> Result<Vec<f64>, ReadError> {
-    let root = file.root_group().map_err(netcdf_reason).at(String::new)?;
-    let reader = Reader { file, root, step: 0 };
+    let reader = Reader::new(file, 0).at(String::new)?;
     let times = reader.values_if("time_whole").and_then(|times| checked_times(times.unwrap_or_default()));
     times.at(|| "time_whole".into())
 }
@@ -40,8 +43,7 @@ pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, Read
         let what = format!("time step {} of {}", options.step, times.len().max(1));
         return Err(ReadReason::Missing(what)).at(String::new);
     }
-    let root = file.root_group().map_err(netcdf_reason).at(String::new)?;
-    let reader = Reader { file, root, step: options.step as u64 };
+    let reader = Reader::new(file, options.step as u64).at(String::new)?;
     let mut draft = Draft::new(options);
     draft.coordinates = reader.coordinates().at(|| "coordinates".into())?;
     let blocks = reader.blocks(&mut draft)?;
@@ -57,9 +59,21 @@ pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, Read
     Ok(mesh)
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    fn new(file: &'a NcFile, step: u64) -> Result<Self, ReadReason> {
+        let root = file.root_group().map_err(netcdf_reason)?;
+        // The first one of a name counts.
+        let variables = root.variables.iter().rev().map(|variable| (variable.name(), variable)).collect();
+        Ok(Self { file, root, variables, step })
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.variables.contains_key(name)
+    }
+
     fn variable(&self, name: &str) -> Result<&NcVariable, ReadReason> {
-        self.root.variable(name).ok_or_else(|| ReadReason::Missing(format!("variable \"{name}\"")))
+        let variable = self.variables.get(name).copied();
+        variable.ok_or_else(|| ReadReason::Missing(format!("variable \"{name}\"")))
     }
 
     fn size(&self, name: &str) -> Result<u64, ReadReason> {
@@ -86,7 +100,7 @@ impl Reader<'_> {
     }
 
     fn values_if(&self, name: &str) -> Result<Option<Vec<f64>>, ReadReason> {
-        self.root.variable(name).map(|_| self.values(name, &[])).transpose()
+        self.has(name).then(|| self.values(name, &[])).transpose()
     }
 
     fn coordinates(&self) -> Result<Vec<f64>, ReadReason> {
@@ -98,7 +112,7 @@ impl Reader<'_> {
         // Old files have one array.
         let mut along = Vec::new();
         for (axis, name) in (0..).zip(["coordx", "coordy", "coordz"]) {
-            let is_old = self.root.variable("coord").is_some();
+            let is_old = self.has("coord");
             along.push(if is_old { self.values("coord", &[axis])? } else { self.values(name, &[])? });
         }
         let points = along[0].len();
@@ -163,7 +177,7 @@ impl Reader<'_> {
 
     /// The names in an array of text.
     fn names(&self, name: &str) -> Result<Vec<String>, ReadReason> {
-        if self.root.variable(name).is_none() {
+        if !self.has(name) {
             return Ok(Vec::new());
         }
         let names = self.file.read_variable_as_strings(name).map_err(netcdf_reason)?;
@@ -177,10 +191,10 @@ impl Reader<'_> {
         for (name, parts) in joined(&names) {
             let place = || format!("variable \"{name}\" at nodes");
             let read = |part: usize| {
-                let values = match self.root.variable("vals_nod_var") {
-                    // Old files have one array.
-                    Some(_) => self.values("vals_nod_var", &[self.step, part as u64]),
-                    None => self.values(&format!("vals_nod_var{}", part + 1), &[self.step]),
+                // Old files have one array.
+                let values = match self.has("vals_nod_var") {
+                    true => self.values("vals_nod_var", &[self.step, part as u64]),
+                    false => self.values(&format!("vals_nod_var{}", part + 1), &[self.step]),
                 }?;
                 expect(points, values)
             };
@@ -198,7 +212,7 @@ impl Reader<'_> {
                 let mut values = Vec::new();
                 for block in blocks {
                     let array = format!("vals_elem_var{}eb{}", part + 1, block.number);
-                    if self.root.variable(&array).is_some() {
+                    if self.has(&array) {
                         values.extend(expect(block.elements, self.values(&array, &[self.step])?)?);
                     } else {
                         values.resize(values.len() + block.elements, 0.0);

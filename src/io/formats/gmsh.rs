@@ -215,7 +215,7 @@ impl<'a> Mesh<'a> {
             return Err(ReadReason::Missing(what)).at(String::new);
         }
         let of_step = std::mem::take(&mut self.views).into_iter().filter(|view| steps.has(&view.head, step));
-        for view in gmsh_views::merge(of_step.collect()) {
+        for view in gmsh_views::merge(of_step.collect()).at(String::new)? {
             let place = || format!("view \"{}\"", view.head.name);
             self.add_view(&view).at(place)?;
         }

@@ -1,6 +1,6 @@
 //! The views of Gmsh's meshes: values at nodes, elements, and nodes of elements, and their time steps.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::io::error::ReadReason;
 use crate::io::formats::gmsh::Layout;
@@ -31,6 +31,13 @@ pub(super) struct Head {
     step: i64,
     pub components: usize,
     count: usize,
+}
+
+impl Head {
+    /// The time, for comparisons: zero has two signs.
+    fn time_bits(&self) -> Option<u64> {
+        self.time.map(|time| (time + 0.0).to_bits())
+    }
 }
 
 /// The rows of a view at one time.
@@ -141,24 +148,20 @@ pub(super) struct Steps {
 impl Steps {
     /// Those of views with these heads. Where one has several steps without times that differ, their numbers are the times.
     pub fn of(heads: &[Head]) -> Self {
-        // Of each view the numbers of its steps, with their times.
-        type OfView = Vec<(i64, Option<f64>)>;
+        // Of each view the numbers of its steps, with the bits of their times.
+        type OfView = HashSet<(i64, Option<u64>)>;
         let mut steps: BTreeMap<(At, String), OfView> = BTreeMap::new();
         for head in heads {
-            let of_view = steps.entry((head.at, head.name.clone())).or_default();
             // Partitions of a view are of one step, as are other views of the same name.
-            if !of_view.contains(&(head.step, head.time)) {
-                of_view.push((head.step, head.time));
-            }
+            steps.entry((head.at, head.name.clone())).or_default().insert((head.step, head.time_bits()));
         }
         let same_time = |of_view: &OfView| {
-            let has_twice =
-                |(i, step): (usize, &(i64, Option<f64>))| of_view[..i].iter().any(|other| other.1 == step.1);
-            of_view.iter().enumerate().any(has_twice)
+            of_view.iter().map(|(_, time)| time).collect::<HashSet<_>>().len() < of_view.len()
         };
         let by_number = steps.values().any(same_time);
-        let time =
-            |(step, time): &(i64, Option<f64>)| if by_number { *step as f64 } else { time.unwrap_or(0.0) };
+        let time = |(step, time): &(i64, Option<u64>)| {
+            if by_number { *step as f64 } else { time.map_or(0.0, f64::from_bits) }
+        };
         let of_several = steps.values().filter(|of_view| of_view.len() > 1);
         let mut times: Vec<f64> = of_several.flatten().map(time).collect();
         times.sort_by(f64::total_cmp);
@@ -177,21 +180,33 @@ impl Steps {
     }
 }
 
+/// The most views with one name at one step.
+const MAX_ALIKE: usize = 1 << 10;
+
 /// Puts together the parts of a view that are of one step: partitions have rows of different nodes or elements.
-pub(super) fn merge(views: Vec<View>) -> Vec<View> {
+pub(super) fn merge(views: Vec<View>) -> Result<Vec<View>, ReadReason> {
     let mut merged: Vec<View> = Vec::new();
+    let mut alike: HashMap<_, Vec<usize>> = HashMap::new();
     for view in views {
-        let other = merged.iter_mut().find(|other| {
-            let (a, b) = (&other.head, &view.head);
-            (a.at, &a.name, a.components, a.step, a.time) == (b.at, &b.name, b.components, b.step, b.time)
-                && !view.rows.keys().any(|tag| other.rows.contains_key(tag))
-        });
-        match other {
-            Some(other) => other.rows.extend(view.rows),
-            None => merged.push(view),
+        let Head { at, name, components, step, .. } = &view.head;
+        let places = alike.entry((*at, name.clone(), *components, *step, view.head.time_bits())).or_default();
+        let is_apart = |&&place: &&usize| {
+            let known: &View = &merged[place];
+            !view.rows.keys().any(|tag| known.rows.contains_key(tag))
+        };
+        match places.iter().find(is_apart).copied() {
+            Some(place) => merged[place].rows.extend(view.rows),
+            None if places.len() == MAX_ALIKE => {
+                let what = format!("views \"{name}\" at one time step");
+                return Err(ReadReason::TooLarge { what, limit: MAX_ALIKE as u64 });
+            }
+            None => {
+                places.push(merged.len());
+                merged.push(view);
+            }
         }
     }
-    merged
+    Ok(merged)
 }
 
 /// Values at nodes of elements as values at nodes.

@@ -2,6 +2,8 @@
 //!
 //! Pieces meet as those of a `.pvtu`.
 
+use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use hdf5_reader::{Dataset, Hdf5File};
@@ -32,12 +34,16 @@ struct Reader<'a> {
     step: Option<u64>,
     /// How many axes its arrays have before those of components.
     axes: usize,
+    /// The names of the arrays in groups that were looked into: each array of each piece is looked for.
+    known: RefCell<HashMap<String, HashSet<String>>>,
 }
 
 /// The times of the steps; none if there are no steps.
 pub(super) fn times(file: &Hdf5File) -> Result<Vec<f64>, ReadError> {
     let options = &ReadOptions::default();
-    Reader { file, options, step: None, axes: 1 }.times().at(|| format!("{ROOT}/Steps"))
+    Reader { file, options, step: None, axes: 1, known: RefCell::default() }
+        .times()
+        .at(|| format!("{ROOT}/Steps"))
 }
 
 /// Reads a mesh or grid.
@@ -45,7 +51,7 @@ pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, Re
     let place = || ROOT.to_owned();
     let times = times(file)?;
     let step = (!times.is_empty()).then_some(options.step as u64);
-    let mut reader = Reader { file, options, step, axes: 1 };
+    let mut reader = Reader { file, options, step, axes: 1, known: RefCell::default() };
     if options.step >= times.len().max(1) {
         let what = format!("time step {} of {}", options.step, times.len().max(1));
         return Err(ReadReason::Missing(what)).at(place);
@@ -101,10 +107,22 @@ impl Reader<'_> {
     /// The same where it need not be there.
     fn dataset_if(&self, path: &str) -> Result<Option<Dataset>, ReadReason> {
         let (folder, name) = path.rsplit_once('/').unwrap_or(("", path));
-        if !self.members(folder)?.iter().any(|member| member == name) {
+        if !self.has_member(folder, name)? {
             return Ok(None);
         }
         self.dataset(path).map(Some)
+    }
+
+    /// Whether an array of this name is in a group.
+    fn has_member(&self, group: &str, name: &str) -> Result<bool, ReadReason> {
+        let mut known = self.known.borrow_mut();
+        if let Some(members) = known.get(group) {
+            return Ok(members.contains(name));
+        }
+        let members: HashSet<String> = self.members(group)?.into_iter().collect();
+        let is_there = members.contains(name);
+        known.insert(group.to_owned(), members);
+        Ok(is_there)
     }
 
     /// The names of the arrays in a group; none if there is no such group.
