@@ -34,8 +34,10 @@ fn nodes_take_as_many_bits_as_the_paper_says() {
     for how in [HALF_EDGE, DELAUNAY, INSERTED] {
         for subject in inputs().into_iter().filter_map(|input| Subject::new(how, input)) {
             let [narrow, wide] = assert_bits(&subject.explicit);
-            println!("{how:?} {}: {narrow:?} {wide:?}", subject.input.name);
-            assert!(wide.faces <= narrow.faces);
+            let name = format!("{how:?} {}: {narrow:?} {wide:?}", subject.input.name);
+            assert!(wide.faces <= narrow.faces && narrow.given_up == wide.given_up, "{name}");
+            // The stream alone leads back to every T_u that builders have made so far.
+            assert_eq!([narrow.trees, wide.trees], [0; 2], "{name}");
         }
     }
 }

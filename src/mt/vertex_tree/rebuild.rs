@@ -154,8 +154,10 @@ impl<'a> Search<'a> {
             return self.to_give_up == 0;
         }
         let Some(entry) = self.entry(t) else { return false };
-        let named = self.apexes.map(|apexes| apexes.get(t).copied());
-        if let Some(x) = named.unwrap_or_else(|| self.apex_at_boundary(t, entry)) {
+        if let Some(apexes) = self.apexes {
+            return apexes.get(t).is_some_and(|&x| self.attempt(t, entry, x));
+        }
+        if let Some(x) = self.apex_at_boundary(t, entry) {
             return self.attempt(t, entry, x);
         }
         for place in 0.. {
