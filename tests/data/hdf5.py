@@ -1,4 +1,5 @@
-"""Writes pieces.vtkhdf, steps.vtkhdf, image.vtkhdf and netcdf4.exo: small files in HDF5 in the layouts that programs write.
+"""Writes pieces.vtkhdf, steps.vtkhdf, image.vtkhdf, dense.vtkhdf, netcdf4.exo, and two files with groups in circles: small files in
+HDF5 in the layouts that programs write.
 
 Needs h5py. The same calls give the same bytes.
 """
@@ -96,6 +97,28 @@ def exodus():
     file.close()
 
 
+def dense():
+    """Groups with many members and attributes (heaps, B-trees 2), and arrays in each way of finding chunks, behind all filters."""
+    file, group = root("dense.vtkhdf", "UnstructuredGrid", "latest")
+    for name, number in {"Points": 4, "Cells": 1, "ConnectivityIds": 4}.items():
+        group[f"NumberOf{name}"] = np.array([number], "i8")
+    group["Points"] = np.array([CUBE[0], CUBE[1], CUBE[3], CUBE[4]], "f8")
+    group["Connectivity"], group["Offsets"] = np.arange(4), np.array([0, 4])
+    group["Types"] = np.array([10], "u1")
+    at_points = group.create_group("PointData")
+    values = np.arange(4, dtype="f4")
+    at_points.create_dataset("growing", data=values, chunks=(1,), maxshape=(None,), fletcher32=True)
+    both = {"chunks": (1, 1), "maxshape": (None, None)}
+    at_points.create_dataset("wide", data=np.arange(8, dtype="i4").reshape(4, 2), **both)
+    at_points.create_dataset("fixed", data=values, chunks=(2,), maxshape=(9,), scaleoffset=2)
+    at_points.create_dataset("one", data=values, chunks=(4,), shuffle=True, compression="gzip")
+    for number in range(8):
+        at_points[f"more{number}"] = values
+        at_points["one"].attrs[f"note{number}"] = np.array([number, number])
+        at_points["one"].attrs[f"text{number}"] = "x" * number
+    file.close()
+
+
 def cycles():
     """A group that is its own member, and forty from each of which two ways lead to the next."""
     with h5py.File("own_root.exo", "w", libver="latest") as file:
@@ -108,5 +131,5 @@ def cycles():
             group = child
 
 
-for write in [pieces, steps, image, exodus, cycles]:
+for write in [pieces, steps, image, dense, exodus, cycles]:
     write()

@@ -10,6 +10,7 @@ use tetralod::mesh::{Field, TetMesh};
 const PIECES: (&str, &[u8]) = ("pieces.vtkhdf", include_bytes!("../data/pieces.vtkhdf"));
 const STEPS: (&str, &[u8]) = ("steps.vtkhdf", include_bytes!("../data/steps.vtkhdf"));
 const IMAGE: (&str, &[u8]) = ("image.vtkhdf", include_bytes!("../data/image.vtkhdf"));
+const DENSE: (&str, &[u8]) = ("dense.vtkhdf", include_bytes!("../data/dense.vtkhdf"));
 const NETCDF4: (&str, &[u8]) = ("netcdf4.exo", include_bytes!("../data/netcdf4.exo"));
 
 fn everything(step: usize) -> ReadOptions {
@@ -51,6 +52,15 @@ fn pieces_meet_and_what_has_no_volume_is_left_out() {
     assert_eq!(io::read_with(&path(PIECES.0), &everything(0)).unwrap(), mesh);
     let survey = io::survey(PIECES.0, PIECES.1).unwrap();
     assert_eq!((survey.format, survey.points, survey.cells), ("vtkhdf", 12, 12));
+}
+
+#[test]
+fn members_in_heaps_and_chunks_are_found_in_every_way() {
+    let mesh = read_step(DENSE, 0).unwrap();
+    for name in ["growing", "fixed", "one", "more0", "more7"] {
+        assert_eq!(field(&mesh.fields, name).values, [0.0, 1.0, 2.0, 3.0], "{name}");
+    }
+    assert_eq!(field(&mesh.fields, "wide_y").values, [1.0, 3.0, 5.0, 7.0]);
 }
 
 #[test]
