@@ -1,7 +1,10 @@
 //! Writes the inputs that fuzzing starts from, made by code, into `corpus/<target>/`.
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use std::error::Error;
 use std::fs;
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::builder::BuildConfig;
@@ -12,11 +15,12 @@ use tetralod::generate::by_name;
 use tetralod::io;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
-use tetralod_fuzz::exercise::SCRIPT;
+use tetralod_fuzz::exercise::{NAMES, SCRIPT};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    let scripts = [[40; SCRIPT], [0, 1, 2, 3, 60, 5, 36, 97, 200, 66, 10, 11, 193, 13, 74, 15], [255; SCRIPT]];
+    let scripts =
+        [[40; SCRIPT], [0, 1, 2, 3, 60, 5, 36, 97, 200, 66, 10, 11, 193, 13, 74, 15], [255; SCRIPT]];
     for (name, bytes) in mts()? {
         for (which, script) in scripts.iter().enumerate() {
             let input = [&script[..], &bytes].concat();
@@ -29,6 +33,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     for (name, bytes) in meshes()? {
         write(&corpus.join("import"), &name, &bytes)?;
+    }
+    for name in HDF5_FILES {
+        write(&corpus.join("hdf5"), name, &data(name)?)?;
+    }
+    for version in [1, 2, 5] {
+        write(&corpus.join("hdf5"), &format!("classic-{version}"), &classic(version))?;
+    }
+    for (number, files) in folders()?.iter().enumerate() {
+        let name = files.first().map_or("none", |(name, _)| *name);
+        write(&corpus.join("folder"), &format!("{number}-{name}"), &together(files)?)?;
     }
     Ok(())
 }
@@ -65,27 +79,63 @@ fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
 
 /// A tetrahedron, or a cube of samples, in formats that are not VTK's.
 const OTHER_FORMATS: [(&str, &str); 10] = [
-    ("ascii-2.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n\
-        5 4 2 6 2 1 2 3 4\n$EndElements\n$NodeData\n1\n\"T\"\n1\n0\n3\n0\n1\n4\n1 1\n2 2\n3 3\n4 4\n$EndNodeData\n"),
-    ("ascii-4.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 2 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n\
-        $EndNodes\n$Elements\n1 1 5 5\n3 2 4 1\n5 1 2 3 4\n$EndElements\n"),
-    ("a.mesh", "MeshVersionFormatted 1\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n"),
-    ("a.vol", "mesh3d\ndimension 3\nvolumeelements\n1\n7 4 1 3 2 4\npoints\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nendmesh\n"),
-    ("list.nrrd", "NRRD0005\ntype: uint8\ndimension: 4\nsizes: 2 2 2 2\nkinds: domain domain domain list\naxis mins: 0 0 0 nan\naxis maxs: 2 4 6 nan\n\
-        encoding: hex\nold min: 1\n\n000102030405060708090a0b0c0d0e0f"),
-    ("text.mha", "NDims = 3\nBinaryData = False\nDimSize = 2 2 2\nElementType = MET_SHORT_ARRAY\nElementDataFile = LOCAL\n1 2 3 4 5 6 7 8"),
-    ("quadratic.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices 10\n0 0 0 0\n2 0 0 0\n0 2 0 0\n0 0 2 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n0 0 1 0\n1 0 1 0\n0 1 1 0\n\
-        TetrahedraP2 1\n1 2 3 4 5 6 7 8 9 10 1\nSolAtVertices 10 1 1\n0 1 2 3 4 5 6 7 8 9\nEnd\n"),
-    ("steps.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n\
+    (
+        "ascii-2.msh",
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n\
+        5 4 2 6 2 1 2 3 4\n$EndElements\n$NodeData\n1\n\"T\"\n1\n0\n3\n0\n1\n4\n1 1\n2 2\n3 3\n4 4\n$EndNodeData\n",
+    ),
+    (
+        "ascii-4.msh",
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 2 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n\
+        $EndNodes\n$Elements\n1 1 5 5\n3 2 4 1\n5 1 2 3 4\n$EndElements\n",
+    ),
+    (
+        "a.mesh",
+        "MeshVersionFormatted 1\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n",
+    ),
+    (
+        "a.vol",
+        "mesh3d\ndimension 3\nvolumeelements\n1\n7 4 1 3 2 4\npoints\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nendmesh\n",
+    ),
+    (
+        "list.nrrd",
+        "NRRD0005\ntype: uint8\ndimension: 4\nsizes: 2 2 2 2\nkinds: domain domain domain list\naxis mins: 0 0 0 nan\naxis maxs: 2 4 6 nan\n\
+        encoding: hex\nold min: 1\n\n000102030405060708090a0b0c0d0e0f",
+    ),
+    (
+        "text.mha",
+        "NDims = 3\nBinaryData = False\nDimSize = 2 2 2\nElementType = MET_SHORT_ARRAY\nElementDataFile = LOCAL\n1 2 3 4 5 6 7 8",
+    ),
+    (
+        "quadratic.mesh",
+        "MeshVersionFormatted 2\nDimension 3\nVertices 10\n0 0 0 0\n2 0 0 0\n0 2 0 0\n0 0 2 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n0 0 1 0\n1 0 1 0\n0 1 1 0\n\
+        TetrahedraP2 1\n1 2 3 4 5 6 7 8 9 10 1\nSolAtVertices 10 1 1\n0 1 2 3 4 5 6 7 8 9\nEnd\n",
+    ),
+    (
+        "steps.msh",
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n\
         1 4 2 1 1 1 2 3 4\n$EndElements\n$NodeData\n1\n\"T\"\n1\n0\n3\n0\n1\n4\n1 1\n2 2\n3 3\n4 4\n$EndNodeData\n$NodeData\n1\n\"T\"\n1\n1\n3\n1\n1\n4\n\
-        1 1\n2 2\n3 3\n4 4\n$EndNodeData\n$ElementNodeData\n1\n\"s\"\n1\n0\n3\n0\n1\n1\n1 4 1 2 3 4\n$EndElementNodeData\n"),
+        1 1\n2 2\n3 3\n4 4\n$EndNodeData\n$ElementNodeData\n1\n\"s\"\n1\n0\n3\n0\n1\n1\n1 4 1 2 3 4\n$EndElementNodeData\n",
+    ),
     ("a.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\nABCDEFGH"),
     ("a.mha", "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\nABCDEFGH"),
 ];
 
-/// Files of other programs: HDF5, netCDF and LZMA.
-const FILES: [&str; 6] =
-    ["image.vtkhdf", "pieces.vtkhdf", "steps.vtkhdf", "netcdf4.exo", "many_ways.exo", "lzma.vtu"];
+/// Files of other programs: HDF5 and netCDF.
+const HDF5_FILES: [&str; 7] = [
+    "image.vtkhdf",
+    "pieces.vtkhdf",
+    "steps.vtkhdf",
+    "dense.vtkhdf",
+    "netcdf4.exo",
+    "many_ways.exo",
+    "own_root.exo",
+];
+
+/// A file that the tests have.
+fn data(name: &str) -> Result<Vec<u8>, Box<dyn Error>> {
+    Ok(fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data").join(name))?)
+}
 
 /// Small meshes in most of the formats that are read.
 fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
@@ -114,10 +164,130 @@ fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     files.push(("plain.vtu".into(), plain.into()));
     let sidecar = "{\"dims\": [2, 2, 2], \"type\": \"uint8\", \"endian\": \"little\", \"spacing\": [1, 1, 1], \"origin\": [0, 0, 0], \"field\": \"p\"}\0abcdefgh";
     files.push(("samples.raw".into(), sidecar.into()));
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data");
-    for name in FILES {
-        files.push((name.into(), fs::read(folder.join(name))?));
+    for name in HDF5_FILES.into_iter().chain(["lzma.vtu"]) {
+        files.push((name.into(), data(name)?));
     }
     files.extend(OTHER_FORMATS.map(|(name, content)| (name.to_owned(), content.into())));
     Ok(files)
+}
+
+/// A tetrahedron as Exodus in a format of netCDF's own: dimensions, variables, and their values.
+fn classic(version: u8) -> Vec<u8> {
+    let word = |number: u64| match version {
+        5 => number.to_be_bytes().to_vec(),
+        _ => (number as u32).to_be_bytes().to_vec(),
+    };
+    let place = |number: usize| match version {
+        1 => (number as u32).to_be_bytes().to_vec(),
+        _ => (number as u64).to_be_bytes().to_vec(),
+    };
+    let tag = |number: u32| number.to_be_bytes().to_vec();
+    let text = |text: &str| {
+        let mut bytes = [word(text.len() as u64), text.as_bytes().to_vec()].concat();
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        bytes
+    };
+    let dimensions = [("num_dim", 3), ("num_nodes", 4), ("num_el_in_blk1", 1), ("num_nod_per_el1", 4)];
+    let doubles = |values: [f64; 4]| values.iter().flat_map(|value| value.to_be_bytes()).collect::<Vec<u8>>();
+    let (integers, floats) = (4_u32, 6_u32);
+    let variables: [(&str, &[u64], u32, Vec<u8>); 4] = [
+        ("coordx", &[1], floats, doubles([0.0, 1.0, 0.0, 0.0])),
+        ("coordy", &[1], floats, doubles([0.0, 0.0, 1.0, 0.0])),
+        ("coordz", &[1], floats, doubles([0.0, 0.0, 0.0, 1.0])),
+        ("connect1", &[2, 3], integers, (1..=4_u32).flat_map(u32::to_be_bytes).collect()),
+    ];
+    let head = |first: usize| {
+        let mut head = [b"CDF".to_vec(), vec![version], word(0), tag(10), word(4)].concat();
+        dimensions.iter().for_each(|(name, size)| head.extend([text(name), word(*size)].concat()));
+        head.extend([tag(0), word(0), tag(11), word(4)].concat());
+        let mut begin = first;
+        for (name, axes, kind, values) in &variables {
+            let axes: Vec<u8> =
+                [word(axes.len() as u64), axes.iter().flat_map(|axis| word(*axis)).collect()].concat();
+            let attributes = match *kind == integers {
+                true => [tag(12), word(1), text("elem_type"), tag(2), text("TETRA")].concat(),
+                false => [tag(0), word(0)].concat(),
+            };
+            head.extend(
+                [text(name), axes, attributes, tag(*kind), word(values.len() as u64), place(begin)].concat(),
+            );
+            begin += values.len();
+        }
+        head
+    };
+    let values = variables.iter().flat_map(|(.., values)| values.clone());
+    head(head(0).len()).into_iter().chain(values).collect()
+}
+
+/// Files as the target `folder` takes them.
+fn together(files: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut input = Vec::new();
+    for (name, content) in files {
+        let number = NAMES.iter().position(|known| known == name).ok_or("a name that is not known")?;
+        input.push(u8::try_from(number)?);
+        input.extend(u16::try_from(content.len())?.to_le_bytes());
+        input.extend(content);
+    }
+    Ok(input)
+}
+
+/// Files that come together, the one that is read first.
+type Files = Vec<(&'static str, Vec<u8>)>;
+
+fn folders() -> Result<Vec<Files>, Box<dyn Error>> {
+    let mesh = by_name("bucky", 3)?;
+    let (mut vtu, mut vti) = (Vec::new(), Vec::new());
+    io::write_vtu(&mesh, &mut vtu)?;
+    io::write_vti(&mesh, &mut vti)?;
+    let packed = |bytes: &[u8]| -> Result<Vec<u8>, Box<dyn Error>> {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(bytes)?;
+        Ok(encoder.finish()?)
+    };
+    let samples = || b"ABCDEFGH".to_vec();
+    let nrrd = |rest: &str| format!("NRRD0005\ntype: uint8\ndimension: 3\nsizes: 2 2 2\n{rest}").into_bytes();
+    let image = |file: &str| {
+        format!("NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = {file}").into_bytes()
+    };
+    let slices = || [("s0.raw", b"ABCD".to_vec()), ("s1.raw", b"EFGH".to_vec())];
+    let collection = "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"a.vtu\"/>\
+                      <DataSet timestep=\"1.5\" file=\"sub/a.vtu\"/></Collection></VTKFile>";
+    let pieces = |kind: &str, extents: &str, sources: [&str; 2]| {
+        let pieces = sources.map(|source| format!("<Piece {extents} Source=\"{source}\"/>")).concat();
+        let whole = extents.replace("Extent", "WholeExtent");
+        format!("<VTKFile type=\"P{kind}\"><P{kind} {whole} GhostLevel=\"0\" Origin=\"0 0 0\" Spacing=\"1 1 1\">{pieces}</P{kind}></VTKFile>")
+            .into_bytes()
+    };
+    let sidecar = b"{\"dims\": [2, 2, 2], \"type\": \"uint8\", \"file\": \"b.raw\"}".to_vec();
+    let nodes = b"5 3 1 1\n1 0 0 0 10 1\n2 1 0 0 20 1\n3 0 1 0 30 1\n4 0 0 1 40 0\n5 0 0 -1 50 0\n".to_vec();
+    let cells = b"2 4 1\n1 1 2 3 4 7\n2 1 3 2 5 8\n".to_vec();
+    let medit = b"MeshVersionFormatted 1\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n";
+    let solution = b"MeshVersionFormatted 1\nDimension 3\nSolAtVertices 4 1 1\n1 2 3 4\nEnd\n".to_vec();
+    let [first, second] = slices();
+    let listed = |header: (&'static str, Vec<u8>)| vec![header, first.clone(), second.clone()];
+    Ok(vec![
+        vec![("a.nhdr", nrrd("encoding: raw\ndata file: a.raw\n")), ("a.raw", samples())],
+        vec![("a.nhdr", nrrd("encoding: gzip\ndata file: a.raw.gz\n")), ("a.raw.gz", packed(&samples())?)],
+        listed(("a.nhdr", nrrd("encoding: raw\ndata file: LIST\ns0.raw\ns1.raw\n"))),
+        listed(("a.nhdr", nrrd("encoding: raw\ndata file: s%d.raw 0 1 1 2\n"))),
+        vec![("a.mhd", image("a.raw")), ("a.raw", samples())],
+        listed(("a.mhd", image("LIST\ns0.raw\ns1.raw\n"))),
+        listed(("a.mhd", image("s%d.raw 0 1 1\n"))),
+        vec![("a.json", sidecar), ("b.raw", samples())],
+        vec![("a.pvd", collection.into()), ("a.vtu", vtu.clone()), ("sub/a.vtu", vtu.clone())],
+        vec![
+            ("a.pvtu", pieces("UnstructuredGrid", "", ["a.vtu", "sub/a.vtu"])),
+            ("a.vtu", vtu.clone()),
+            ("sub/a.vtu", vtu.clone()),
+        ],
+        vec![
+            ("a.pvti", pieces("ImageData", "Extent=\"0 2 0 2 0 2\"", ["a.vti", "b.vti"])),
+            ("a.vti", vti.clone()),
+            ("b.vti", vti),
+        ],
+        vec![("a.node", nodes.clone()), ("a.ele", cells.clone())],
+        vec![("a.ele", cells), ("a.node", nodes)],
+        vec![("a.mesh", medit.to_vec()), ("a.sol", solution)],
+        vec![("a.vtu.gz", packed(&vtu)?)],
+    ])
 }

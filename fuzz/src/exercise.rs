@@ -3,6 +3,9 @@
 //! Nothing here may panic but for a bug: errors are answers, too. Where an input begins with a script, its bytes say what to
 //! do when; the file follows.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use tetralod::format::{DecodeOptions, Decoder, Limits};
 use tetralod::geom::Bounds;
 use tetralod::io;
@@ -29,6 +32,8 @@ pub fn run(target: &str, input: &[u8]) -> bool {
         "index" => index(input),
         "refine" => refine(input),
         "import" => import(input),
+        "folder" => folder(input),
+        "hdf5" => hdf5(input),
         _ => return false,
     }
     true
@@ -199,6 +204,111 @@ pub fn import(input: &[u8]) {
     let _ = io::survey("input", input);
     if let Some(at) = input.iter().position(|&byte| byte == 0) {
         let _ = io::read_raw("input.json", &input[..at], &input[at + 1..]);
+    }
+}
+
+/// The most memory that reading by a path may take.
+const MEMORY: u64 = 16 << 20;
+
+/// What files are called that come together; the first one of an input is read.
+pub const NAMES: [&str; 32] = [
+    "a.nhdr",
+    "a.nrrd",
+    "a.mhd",
+    "a.mha",
+    "a.raw",
+    "b.raw",
+    "s0.raw",
+    "s1.raw",
+    "a.json",
+    "a.pvd",
+    "a.pvtu",
+    "a.pvti",
+    "a.pvtr",
+    "a.pvts",
+    "a.vtu",
+    "b.vtu",
+    "a.vti",
+    "b.vti",
+    "a.vtr",
+    "a.vts",
+    "a.vtk",
+    "a.node",
+    "a.ele",
+    "a.face",
+    "a.mesh",
+    "a.sol",
+    "a.meshb",
+    "a.solb",
+    "a.msh",
+    "a.vtu.gz",
+    "a.raw.gz",
+    "sub/a.vtu",
+];
+
+/// Files in a folder: for each its number in [`NAMES`], its length in two bytes, and its content.
+pub fn folder(input: &[u8]) {
+    let folder = Folder::new();
+    let (mut rest, mut first) = (input, None);
+    while let [number, low, high, content @ ..] = rest {
+        let name = NAMES[usize::from(*number) % NAMES.len()];
+        let length = usize::from(u16::from_le_bytes([*low, *high])).min(content.len());
+        let path = folder.put(name, &content[..length]);
+        first = first.or(Some(path));
+        rest = &content[length..];
+    }
+    if let Some(path) = first {
+        read_by_path(&path);
+    }
+}
+
+/// A file in HDF5 or netCDF, by its path.
+pub fn hdf5(input: &[u8]) {
+    let folder = Folder::new();
+    read_by_path(&folder.put("a.vtkhdf", input));
+    let _ = io::survey("a.vtkhdf", input);
+}
+
+/// Reads some of the steps that a file stands for, and its pieces if it has some.
+fn read_by_path(path: &Path) {
+    let options = |step: usize| io::ReadOptions {
+        cells: io::CellData::Values,
+        memory: io::MemoryLimit::of(MEMORY),
+        step,
+        ..io::ReadOptions::default()
+    };
+    for step in io::steps(path).unwrap_or_default().iter().take(3) {
+        let _ = io::read_with(&step.path, &options(step.number));
+    }
+    #[cfg(feature = "formats")]
+    if let Ok(Some(pieces)) = io::Pieces::open(path, &options(0)) {
+        let _ = pieces.counts();
+        let _ = pieces.for_each(&mut |_| Ok::<(), io::ReadError>(()));
+    }
+}
+
+/// A folder of its own, as long as this lives.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let (process, number) = (std::process::id(), NUMBER.fetch_add(1, Relaxed));
+        let path = std::env::temp_dir().join(format!("tetralod-fuzz-{process}-{number}"));
+        fs::create_dir_all(path.join("sub")).expect("a folder for temporary files");
+        Self(path)
+    }
+
+    fn put(&self, name: &str, content: &[u8]) -> PathBuf {
+        let path = self.0.join(name);
+        fs::write(&path, content).expect("a temporary file");
+        path
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
     }
 }
 

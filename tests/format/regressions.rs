@@ -8,7 +8,7 @@ use crate::support::files::{assemble, bytes_in_blocks, inserted, sample, section
 use std::fs;
 use std::path::Path;
 
-const TARGETS: [&str; 5] = ["decode_fixed", "decode", "index", "refine", "import"];
+const TARGETS: [&str; 7] = ["decode_fixed", "decode", "index", "refine", "import", "folder", "hdf5"];
 
 #[test]
 fn no_finding_comes_back() {
