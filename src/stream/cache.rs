@@ -177,4 +177,16 @@ mod tests {
         assert_eq!(Cache::open(&smaller, "u", "v").get(&(0..500)), None, "it had to go");
         let _ = fs::remove_dir_all(&options.path);
     }
+
+    #[test]
+    fn a_folder_that_is_too_large_gets_room_for_more() {
+        let options = folder("room");
+        let mut cache = Cache::open(&options, "u", "v");
+        (0..10).for_each(|i| cache.put(&(96 * i..96 * (i + 1)), &[1; 96]));
+        // With their checksums they take all of 1000 bytes. Of 900 a quarter has to be free, not a byte.
+        let smaller = CacheFolder { max_bytes: 900, ..options.clone() };
+        let cache = Cache::open(&smaller, "u", "v");
+        assert_eq!((cache.known.len(), cache.room), (6, 300));
+        let _ = fs::remove_dir_all(&options.path);
+    }
 }

@@ -451,4 +451,23 @@ mod tests {
             mesh.epoch = EPOCHS - 1;
         }
     }
+
+    #[test]
+    fn orientations_are_exact_on_the_widest_lattices() {
+        let plain = |[u, v, w]: [[i64; 3]; 3]| {
+            let [u, v, w] = [u, v, w].map(|p| p.map(i128::from));
+            (u[1] * v[2] - u[2] * v[1]) * w[0]
+                + (u[2] * v[0] - u[0] * v[2]) * w[1]
+                + (u[0] * v[1] - u[1] * v[0]) * w[2]
+        };
+        // Numbers of Fibonacci: `u` and `v` have a determinant of 1 in a plane, so that of all three is as large as `lift`.
+        let (u, v) = ([102_334_155, 165_580_141, 123_456_789], [165_580_141, 267_914_296, -300_000_007]);
+        for lift in -3..=3 {
+            let w = [u[0] + v[0], u[1] + v[1], u[2] + v[2] + lift];
+            for vectors in [[u, v, w], [v, u, w], [w, u, v], [w, v, u]] {
+                let told = is_positive(vectors.map(|p| p.map(|x| x as f64)), doubt(crate::geom::WIDE_BITS));
+                assert_eq!(told, plain(vectors) > 0, "{vectors:?}");
+            }
+        }
+    }
 }
