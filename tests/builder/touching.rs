@@ -191,6 +191,10 @@ fn carved(cells: [u32; 3], keeps: impl Fn([f64; 3]) -> bool, change: impl FnOnce
     };
     mesh.tets.retain(|tet| keeps(middle(tet)));
     change(&mut mesh);
+    // Nowhere is the boundary flat: else it would stay for that alone.
+    let mut random = Random::new(45);
+    let mut wobble = |x: f64| x + f64::from(random.between(-STEPS / 10, STEPS / 10));
+    mesh.positions.iter_mut().for_each(|p| *p = p.map(&mut wobble));
     let place = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] / f64::from(STEPS * cells[k] as i32));
     let values = mesh.positions.iter().map(|p| hilly(place(p))).collect();
     mesh.fields.push(Field::new("f", values));
