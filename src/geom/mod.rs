@@ -30,7 +30,7 @@ pub(crate) use point_grid::PointGrid;
 pub use predicates::{NARROW_BITS, WIDE_BITS, in_conflict, insphere, orient3d};
 pub(crate) use predicates::{det_i64, views_of_origin};
 pub use single::{SinglePoints, SingleValues, keeps_in_single};
-pub(crate) use sort::{sort_few, total_order};
+pub(crate) use sort::{bits_of, sort_few, total_order};
 pub use tet_box::{LatticeBox, tet_meets_box};
 pub use triangle::nearest_on_triangle;
 pub(crate) use triangle::weights_on_triangle;

@@ -20,6 +20,11 @@ pub(crate) fn total_order(x: f64) -> u64 {
     if x.is_sign_negative() { !bits } else { bits | 1 << 63 }
 }
 
+/// The bits of a number, which are equal where numbers are, though zero has two signs: to look numbers up.
+pub(crate) fn bits_of(x: f64) -> u64 {
+    (x + 0.0).to_bits()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

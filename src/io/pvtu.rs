@@ -7,6 +7,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use crate::geom::bits_of;
 use crate::io::cells::Numbering;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::vtu::{NumberPoints, PieceReader, first_number, join};
@@ -116,9 +117,9 @@ impl Whole {
     }
 }
 
-/// The bits of a position; zero has two signs.
+/// The bits of a position.
 pub(super) fn bits(point: [f64; 3]) -> [u64; 3] {
-    point.map(|x| (x + 0.0).to_bits())
+    point.map(bits_of)
 }
 
 /// Keeps the values with these indices, which ascend.

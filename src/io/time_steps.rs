@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use thiserror::Error;
 
+use crate::geom::bits_of;
 use crate::io::{CellData, ReadError, ReadOptions};
 use crate::mesh::{Field, GeometryField, StepError, TetMesh};
 
@@ -129,9 +130,7 @@ fn append(
     read: &mut dyn FnMut(usize, &ReadOptions) -> Result<TetMesh, ReadError>,
 ) -> Result<(), TimeStepsError> {
     let first_time = first_time.or_else(|| time_of(mesh));
-    // Zero has two signs.
-    let key = |time: f64| (time + 0.0).to_bits();
-    let mut times = HashSet::from([key(first_time.unwrap_or(0.0))]);
+    let mut times = HashSet::from([bits_of(first_time.unwrap_or(0.0))]);
     set_time(mesh, first_time.unwrap_or(0.0));
     for (number, (file, time)) in later.iter().enumerate() {
         let file = || file.clone();
@@ -141,7 +140,7 @@ fn append(
             (None, None) => number as f64 + 1.0,
             _ => return Err(TimeStepsError::MixedTimes { file: file() }),
         };
-        if !times.insert(key(time)) {
+        if !times.insert(bits_of(time)) {
             return Err(TimeStepsError::SameTime { file: file(), time });
         }
         set_time(&mut next, time);

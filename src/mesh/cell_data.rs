@@ -1,5 +1,6 @@
 //! Fields at cells as fields at points.
 
+use crate::geom::bits_of;
 use crate::mesh::{Field, TetMesh};
 use std::collections::HashSet;
 
@@ -19,7 +20,7 @@ impl TetMesh {
         }
         let volumes = self.relative_volumes();
         // Time steps share a name.
-        let key = |field: &Field| (field.name.clone(), field.time.map(|time| (time + 0.0).to_bits()));
+        let key = |field: &Field| (field.name.clone(), field.time.map(bits_of));
         let mut taken: HashSet<_> = self.fields.iter().map(key).collect();
         for mut field in read {
             field.values = self.mean_of_cells(&field.values, &volumes);

@@ -9,6 +9,7 @@ use std::collections::{HashMap, VecDeque};
 
 use glam::DVec3;
 
+use crate::geom::bits_of;
 use crate::mesh::check::{scale_of, side_of};
 use crate::mesh::{InputCell, TetMesh};
 use crate::threads;
@@ -234,6 +235,5 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn key([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> [u64; 6] {
-    // Zero has two signs.
-    [a, b, c, d, e, f].map(|x| (x + 0.0).to_bits())
+    [a, b, c, d, e, f].map(bits_of)
 }

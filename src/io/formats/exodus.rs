@@ -192,10 +192,11 @@ impl<'a> Reader<'a> {
             let place = || format!("variable \"{name}\" at nodes");
             let read = |part: usize| {
                 // Old files have one array.
-                let values = match self.has("vals_nod_var") {
-                    true => self.values("vals_nod_var", &[self.step, part as u64]),
-                    false => self.values(&format!("vals_nod_var{}", part + 1), &[self.step]),
-                }?;
+                let values = if self.has("vals_nod_var") {
+                    self.values("vals_nod_var", &[self.step, part as u64])?
+                } else {
+                    self.values(&format!("vals_nod_var{}", part + 1), &[self.step])?
+                };
                 expect(points, values)
             };
             draft.read_at_points(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;

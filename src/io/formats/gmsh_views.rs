@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use crate::geom::bits_of;
 use crate::io::error::ReadReason;
 use crate::io::formats::gmsh::Layout;
 use crate::io::formats::scanner::Scanner;
@@ -34,9 +35,9 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// The time, for comparisons: zero has two signs.
+    /// The bits of the time, to look it up.
     fn time_bits(&self) -> Option<u64> {
-        self.time.map(|time| (time + 0.0).to_bits())
+        self.time.map(bits_of)
     }
 }
 

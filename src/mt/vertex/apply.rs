@@ -4,7 +4,7 @@
 //! tag is the number of that child of the tetrahedron's creator.
 
 use super::bit_string::width_of;
-use super::cavity::{Cavity, SLOTS, Wall, take_cavity};
+use super::cavity::{Cavity, SLOTS, Wall, with_cavity};
 use super::cavity_fill::{Across, Close, Face, turned};
 use super::limits::{COUNT_BITS, MAX_AROUND, MAX_INSERTED};
 use super::shape_code::{Code, write_given_up};
@@ -631,21 +631,17 @@ impl ApplyUpdates for VertexMt {
     }
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut cavity = take_cavity(mesh);
-        let applied = self.insert(mesh, u, &mut cavity);
-        mesh.put_back_kind_state(cavity);
-        applied
+        with_cavity(mesh, |mesh, cavity| self.insert(mesh, u, cavity))
     }
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut cavity = take_cavity(mesh);
-        let build = |mesh: &CurrentMesh, cavity: &mut Cavity| self.build_removed(mesh, u, cavity);
-        let rebuilt = self.rebuild(mesh, u, &mut cavity, build);
-        if rebuilt == Ok(Applied::Done) {
-            self.perform_removal(mesh, u, &mut cavity, |_| u.0);
-        }
-        mesh.put_back_kind_state(cavity);
-        rebuilt
+        with_cavity(mesh, |mesh, cavity| {
+            let rebuilt = self.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity));
+            if rebuilt == Ok(Applied::Done) {
+                self.perform_removal(mesh, u, cavity, |_| u.0);
+            }
+            rebuilt
+        })
     }
 
     fn look_at_removed(
@@ -654,14 +650,13 @@ impl ApplyUpdates for VertexMt {
         u: UpdateId,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        let mut cavity = take_cavity(mesh);
-        let build = |mesh: &CurrentMesh, cavity: &mut Cavity| self.build_removed(mesh, u, cavity);
-        let rebuilt = self.rebuild(mesh, u, &mut cavity, build);
-        if rebuilt == Ok(Applied::Done) {
-            show_built(mesh, &cavity, self.kept_quarterings(u, &cavity), look);
-        }
-        mesh.put_back_kind_state(cavity);
-        rebuilt
+        with_cavity(mesh, |mesh, cavity| {
+            let rebuilt = self.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity));
+            if rebuilt == Ok(Applied::Done) {
+                show_built(mesh, cavity, self.kept_quarterings(u, cavity), look);
+            }
+            rebuilt
+        })
     }
 
     /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
@@ -675,16 +670,13 @@ impl ApplyUpdates for VertexMt {
         u: UpdateId,
         found: &mut Vec<u32>,
     ) -> Result<(), UpdateError> {
-        let mut cavity = take_cavity(mesh);
-        let gathered = self.gather_removed(mesh, u, self.shape(u).removed, &mut cavity);
-        if gathered == Ok(Applied::Done) {
+        with_cavity(mesh, |mesh, cavity| {
+            let Applied::Done = self.gather_removed(mesh, u, self.shape(u).removed, cavity)? else {
+                return Err(UpdateError::Error { update: u.0 });
+            };
             found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
-        }
-        mesh.put_back_kind_state(cavity);
-        match gathered? {
-            Applied::Done => Ok(()),
-            Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
-        }
+            Ok(())
+        })
     }
 
     fn find_inserted(

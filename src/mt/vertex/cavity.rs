@@ -80,8 +80,16 @@ impl KindState for Cavity {
     }
 }
 
-pub(in crate::mt) fn take_cavity(mesh: &mut CurrentMesh) -> Box<Cavity> {
-    mesh.take_kind_state().unwrap_or_default()
+/// Does something with the scratch space that a mesh has.
+#[inline]
+pub(in crate::mt) fn with_cavity<T>(
+    mesh: &mut CurrentMesh,
+    work: impl FnOnce(&mut CurrentMesh, &mut Cavity) -> T,
+) -> T {
+    let mut cavity: Box<Cavity> = mesh.take_kind_state().unwrap_or_default();
+    let done = work(mesh, &mut cavity);
+    mesh.put_back_kind_state(cavity);
+    done
 }
 
 /// A hash of the tetrahedra that an insertion removed, which the mesh keeps with the vertex (its [`KindWord`](crate::mt::mesh::current::KindWord)). What the removal of the vertex puts

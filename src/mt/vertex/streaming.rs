@@ -4,7 +4,7 @@
 //! beside the nodes; then they move into them.
 
 use super::bit_string::{Bits, width_of};
-use super::cavity::take_cavity;
+use super::cavity::with_cavity;
 use super::growing::Growing;
 use super::limits::MAX_REMOVED;
 use crate::mesh::NONE;
@@ -73,10 +73,7 @@ impl VertexMt {
         if !self.info.holds(new.position, new.levels) {
             return Err(UpdateError::OffLattice { update });
         }
-        let mut cavity = take_cavity(mesh);
-        let inserted = self.insert_next(mesh, new, &mut cavity);
-        mesh.put_back_kind_state(cavity);
-        inserted?;
+        with_cavity(mesh, |mesh, cavity| self.insert_next(mesh, new, cavity))?;
         self.set_own_fall(UpdateId(update), new.own_fall);
         if self.updates() == self.info.updates {
             self.pack()?;

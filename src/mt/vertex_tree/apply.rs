@@ -12,7 +12,7 @@ use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::stars::BARE;
 use crate::mt::vertex::apply::show_built;
 use crate::mt::vertex::bit_string::width_of;
-use crate::mt::vertex::cavity::{Cavity, take_cavity};
+use crate::mt::vertex::cavity::{Cavity, with_cavity};
 use crate::mt::vertex::cavity_fill::Face;
 use crate::mt::vertex::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 use crate::mt::{
@@ -238,21 +238,18 @@ impl ApplyUpdates for VertexTreeMt {
     }
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut cavity = take_cavity(mesh);
-        let applied = self.insert(mesh, u, &mut cavity);
-        mesh.put_back_kind_state(cavity);
-        applied
+        with_cavity(mesh, |mesh, cavity| self.insert(mesh, u, cavity))
     }
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut cavity = take_cavity(mesh);
-        let rebuilt = self.rebuild(mesh, u, &mut cavity);
-        if rebuilt == Ok(Applied::Done) {
-            // The first tetrahedron of the stream is t_u.
-            self.loops.perform_removal(mesh, u, &mut cavity, |k| tag_of(u.0, k == 0));
-        }
-        mesh.put_back_kind_state(cavity);
-        rebuilt
+        with_cavity(mesh, |mesh, cavity| {
+            let rebuilt = self.rebuild(mesh, u, cavity);
+            if rebuilt == Ok(Applied::Done) {
+                // The first tetrahedron of the stream is t_u.
+                self.loops.perform_removal(mesh, u, cavity, |k| tag_of(u.0, k == 0));
+            }
+            rebuilt
+        })
     }
 
     fn look_at_removed(
@@ -261,13 +258,13 @@ impl ApplyUpdates for VertexTreeMt {
         u: UpdateId,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        let mut cavity = take_cavity(mesh);
-        let rebuilt = self.rebuild(mesh, u, &mut cavity);
-        if rebuilt == Ok(Applied::Done) {
-            show_built(mesh, &cavity, None, look);
-        }
-        mesh.put_back_kind_state(cavity);
-        rebuilt
+        with_cavity(mesh, |mesh, cavity| {
+            let rebuilt = self.rebuild(mesh, u, cavity);
+            if rebuilt == Ok(Applied::Done) {
+                show_built(mesh, cavity, None, look);
+            }
+            rebuilt
+        })
     }
 
     /// All alike, as in [`VertexMt`](crate::mt::VertexMt).
@@ -284,11 +281,11 @@ impl ApplyUpdates for VertexTreeMt {
         if self.missing_parent(mesh, u).is_some() {
             return Err(UpdateError::Error { update: u.0 });
         }
-        let mut cavity = take_cavity(mesh);
-        let end = self.recognise(mesh, u, &mut cavity);
-        found.extend_from_slice(&cavity.tets[..if end.is_some() { cavity.tets_len } else { 0 }]);
-        mesh.put_back_kind_state(cavity);
-        end.map(|_| ()).ok_or(UpdateError::Cavity { update: u.0 })
+        with_cavity(mesh, |mesh, cavity| {
+            self.recognise(mesh, u, cavity).ok_or(UpdateError::Cavity { update: u.0 })?;
+            found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
+            Ok(())
+        })
     }
 
     fn find_inserted(
