@@ -11,9 +11,9 @@ use tetralod::mt::{ApplyUpdates, MtKind};
 use tetralod::verify::{Reference, Sample};
 use tetralod::{io, verify};
 
-fn load(name: &str) -> Option<TetMesh> {
-    let mesh = io::read(&real_data()?.join(name)).expect("a file that can be read");
-    Some(repair(mesh).expect("a mesh that can be repaired").0)
+fn load(name: &str) -> TetMesh {
+    let mesh = io::read(&real_data().join(name)).expect("a file that can be read");
+    repair(mesh).expect("a mesh that can be repaired").0
 }
 
 /// Constructions that are not the default, and need an MT of their own.
@@ -61,35 +61,38 @@ fn keeps_promises(name: &str, mt: &impl ApplyUpdates, mesh: &TetMesh, reference:
 }
 
 fn file(name: &str, most: u32) {
-    if let Some(mesh) = load(name) {
-        check(name, &mesh, most);
-    }
+    check(name, &load(name), most);
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn bluntfin() {
     file("bluntfin_clean.vtu", 2000);
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn combustor() {
     file("combustor.vtu", 2000);
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn fea_bracket() {
     file("fea_bracket.vtu", 3000);
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn bucky() {
     file("bucky.vti", 1000);
 }
 
 /// Every fourth sample of the middle, so that all constructions take seconds.
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn part_of_cthead() {
-    let Some(mesh) = load("cthead.vti") else { return };
+    let mesh = load("cthead.vti");
     let Some(Grid { dims: [nx, ny, _], origin, spacing }) = mesh.grid else {
         panic!("a regular grid");
     };
@@ -113,13 +116,14 @@ fn part_of_cthead() {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn meshes_with_something_wrong_or_unusual() {
     for name in
         ["post_slit", "angular_sector", "ossicles", "raptor_8418", "manifold_check0", "manifold_check1"]
     {
         file(&format!("robust/{name}.vtu"), 1500);
     }
-    let Some(data) = real_data() else { return };
+    let data = real_data();
     for (name, reason) in [("can_crushed", "folded"), ("manifold_check2", "shared by")] {
         let mesh = io::read(&data.join(format!("robust/{name}.vtu"))).expect("a file that can be read");
         let refusal = repair(mesh).expect_err("not a mesh").to_string();
@@ -128,6 +132,7 @@ fn meshes_with_something_wrong_or_unusual() {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn meshes_of_many_kinds() {
     for name in ["disk_out_ref", "cylinder_flow", "piezo_micro", "hand", "piece"] {
         file(&format!("{name}.vtu"), 1000);
@@ -154,8 +159,9 @@ const BROKEN: [(&str, [Fate; 3]); 9] = [
 ];
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn broken_meshes_end_in_a_valid_mt_or_a_reason_at_each_level() {
-    let Some(data) = real_data() else { return };
+    let data = real_data();
     for (name, fates) in BROKEN {
         let mesh = io::read(&data.join(name)).expect("a file that can be read");
         let mut last = None;
@@ -185,8 +191,9 @@ fn broken_meshes_end_in_a_valid_mt_or_a_reason_at_each_level() {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn what_is_found_in_broken_meshes_and_what_welding_closes() {
-    let Some(data) = real_data() else { return };
+    let data = real_data();
     let one = MeshFindings { components: 1, ..MeshFindings::default() };
     let touching = |components, non_manifold_edges, non_manifold_vertices| MeshFindings {
         components,

@@ -19,8 +19,9 @@ fn refused(folder: &Path, name: &str) -> ReadError {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn every_encoding_of_one_mesh() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     let exact = read(&folder, "encodings/appended_raw.vtu");
     assert_eq!((exact.positions.len(), exact.tets.len(), exact.fields.len()), (465, 1522, 1));
     let mut files = 0;
@@ -47,8 +48,9 @@ fn every_encoding_of_one_mesh() {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn grids_in_all_their_formats() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     for name in ["bucky", "nucleon", "hydrogen", "neghip", "ironprot", "cthead"] {
         let image = read(&folder, &format!("{name}.vti"));
         assert_eq!(image, read(&folder, &format!("{name}.json")), "{name}");
@@ -63,8 +65,9 @@ fn grids_in_all_their_formats() {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn files_that_must_be_refused() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     for (name, reason) in [
         ("native/Armadillo_Tetra_4406_for_test_broken.vtu", "expected 4407, found 4406"),
         ("native/liver_for_test_broken.vtk", "is not known"),
@@ -122,8 +125,9 @@ const GOOD: &[Expected] = &[
 ];
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn good_and_mendable_meshes() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     for &(name, points, tets, components, boundary, summary) in GOOD {
         let (mesh, report) = mesh::repair(read(&folder, name)).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(report.to_string(), summary, "{name}");
@@ -135,8 +139,9 @@ fn good_and_mendable_meshes() {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn non_manifold_vertices_are_found() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     for (name, count) in [
         ("robust/manifold_check0.vtu", 3),
         ("robust/manifold_check1.vtu", 4),
@@ -151,15 +156,17 @@ fn non_manifold_vertices_are_found() {
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn bluntfin_is_mended_into_its_clean_twin() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     let (mended, _) = mesh::repair(read(&folder, "bluntfin.vtu")).unwrap();
     assert_eq!(mended, read(&folder, "bluntfin_clean.vtu"));
 }
 
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn meshes_that_cannot_be_mended_name_their_cells() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     let error = |name: &str| mesh::repair(read(&folder, name)).unwrap_err();
     assert_eq!(
         error("robust/manifold_check2.vtu"),
@@ -177,8 +184,9 @@ fn meshes_that_cannot_be_mended_name_their_cells() {
 
 #[cfg(feature = "formats")]
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn files_of_meshers() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     for (name, points, tets) in [
         ("native/liver.msh", 181, 596),
         ("native/6_tetra_bad.msh", 17, 6),
@@ -208,8 +216,9 @@ type Range<'a> = (&'a str, f64, f64);
 
 #[cfg(feature = "formats")]
 #[test]
+#[ignore = "needs the data sets of TETRALOD_DATA"]
 fn odd_files_of_meshers_and_images() {
-    let Some(folder) = real_data() else { return };
+    let folder = real_data();
     let volume = |mesh: &TetMesh| -> f64 {
         let of = |tet: &[u32; 4]| {
             let [a, b, c, d] = tet.map(|v| glam::DVec3::from_array(mesh.positions[v as usize]));

@@ -48,7 +48,7 @@ fn show_mesh(renderer: &mut Renderer) {
 
 #[test]
 fn a_mesh_kept_up_by_ranges_is_the_whole_mesh() {
-    let Some(mut kept) = twin::renderer(SIZE) else { return };
+    let mut kept = twin::renderer(SIZE);
     show_mesh(&mut kept);
     let (mut session, camera, look) = (session(12), camera(), Look::default());
     let mut small = 0;
@@ -60,7 +60,7 @@ fn a_mesh_kept_up_by_ranges_is_the_whole_mesh() {
         let changed = changes.tets.iter().map(|range| range.end - range.start).sum::<u32>() as usize;
         kept.update_mesh(&view, Some([&changes.vertices, &changes.tets])).unwrap();
         let by_ranges = kept.take_uploaded();
-        let mut fresh = twin::renderer(SIZE).expect("there was one");
+        let mut fresh = twin::renderer(SIZE);
         show_mesh(&mut fresh);
         fresh.take_uploaded();
         fresh.update_mesh(&view, None).unwrap();
@@ -86,7 +86,7 @@ fn a_mesh_kept_up_by_ranges_is_the_whole_mesh() {
 
 #[test]
 fn a_part_of_the_mesh_that_is_needed_later_is_there() {
-    let Some(mut kept) = twin::renderer(SIZE) else { return };
+    let mut kept = twin::renderer(SIZE);
     let (mut session, camera, look) = (session(8), camera(), Look::default());
     let cells = CellStyle { shape: CellShape::Wire, ..CellStyle::default() };
     let medium = Medium::new(&[(0.0, [0.2, 0.4, 0.9, 0.1]), (1.0, [1.0, 0.5, 0.1, 0.8])], 0.5);
@@ -95,7 +95,7 @@ fn a_part_of_the_mesh_that_is_needed_later_is_there() {
         let shown = [step % 2 == 0, step % 3 != 1];
         session.refine(request).expect("a good request");
         let changes = session.take_changes();
-        let mut fresh = twin::renderer(SIZE).expect("there was one");
+        let mut fresh = twin::renderer(SIZE);
         for renderer in [&mut kept, &mut fresh] {
             renderer.set_volume(shown[0].then_some((&medium, u32::MAX))).unwrap();
             renderer.set_cells(shown[1].then_some(&cells));
@@ -111,7 +111,7 @@ fn a_part_of_the_mesh_that_is_needed_later_is_there() {
 
 #[test]
 fn surfaces_kept_up_by_ranges_are_whole_ones() {
-    let Some(mut kept) = twin::renderer(SIZE) else { return };
+    let mut kept = twin::renderer(SIZE);
     let (mut session, camera, look) = (session(12), camera(), Look::default());
     let mut small = 0;
     for (step, request) in requests().iter().enumerate() {
@@ -122,7 +122,7 @@ fn surfaces_kept_up_by_ranges_are_whole_ones() {
         kept.take_uploaded();
         kept.set_surface(3, &triangles, Some(&changes)).unwrap();
         let by_ranges = kept.take_uploaded();
-        let mut fresh = twin::renderer(SIZE).expect("there was one");
+        let mut fresh = twin::renderer(SIZE);
         fresh.set_surface(3, &triangles, None).unwrap();
         let as_a_whole = fresh.take_uploaded();
         let (changed, all) = (

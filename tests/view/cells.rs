@@ -73,7 +73,7 @@ fn coloured(pixels: &[[f64; 3]]) -> usize {
 
 #[test]
 fn solid_tetrahedra_are_those_of_the_twin() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     for (mesh, scene) in [("ball", Scene::ball(3)), ("hollow", twin::hollow())] {
         let own: Vec<f64> = (0..scene.tets.len()).map(|t| (t * 37 % 101) as f64 / 55.0 - 0.8).collect();
         renderer.set_cell_values(&own).unwrap();
@@ -106,7 +106,7 @@ fn solid_tetrahedra_are_those_of_the_twin() {
 
 #[test]
 fn cut_tetrahedra_are_those_of_the_cutaway() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let scene = Scene::ball(4);
     for (number, cut) in [
         ClipPlane::NOTHING,
@@ -160,7 +160,7 @@ fn middles() -> impl Iterator<Item = (usize, DVec2)> {
 
 #[test]
 fn wires_run_along_the_edges() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let scene = Scene::ball(2);
     let style = CellStyle { shape: CellShape::Wire, ..CellStyle::default() };
     for camera in cameras() {
@@ -186,7 +186,7 @@ fn wires_run_along_the_edges() {
 
 #[test]
 fn points_are_discs_at_the_points() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let scene = Scene::ball(2);
     let look = Look { pixel_ratio: 2.0, ..twin::plain() };
     let style = CellStyle { shape: CellShape::Points(4.0), ..solid(0.0) };

@@ -57,7 +57,7 @@ fn each_half_is_as_it_is_alone() {
     let cells = CellState { colour_by: "size".to_owned(), shrink: 0.2, ..CellState::default() };
     let cells = SceneState { cells: Some(cells), ..SceneState::default() };
     for state in [volume, cells] {
-        let Some(renderer) = twin::renderer(SIZE) else { return };
+        let renderer = twin::renderer(SIZE);
         let (mut scene, mut session) = (scene(renderer, &state), opened());
         refined(&mut session, 0.3);
         let coarse = picture(&mut scene, &mut session);
@@ -78,7 +78,7 @@ fn each_half_is_as_it_is_alone() {
 
 #[test]
 fn the_difference_has_symmetric_colours() {
-    let Some(renderer) = twin::renderer(SIZE) else { return };
+    let renderer = twin::renderer(SIZE);
     let slice: SliceState = SliceState {
         normal: [0.0, 0.0, 1.0],
         offset: 0.5,

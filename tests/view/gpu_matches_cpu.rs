@@ -48,7 +48,7 @@ fn check(pixels: &[[f64; 3]], expected: impl Fn(usize) -> Option<DVec3>) -> usiz
 
 #[test]
 fn the_lit_isosurface_matches_the_ray_caster() {
-    let Some(mut renderer) = renderer(SIZE) else { return };
+    let mut renderer = renderer(SIZE);
     let scene = Scene::ball(8);
     let look = Look::default();
     // A closed ball from outside; and an open one, whose inside is seen through the cube's faces.
@@ -81,7 +81,7 @@ fn the_lit_isosurface_matches_the_ray_caster() {
 
 #[test]
 fn the_cutaway_matches_the_ray_caster() {
-    let Some(mut renderer) = renderer(SIZE) else { return };
+    let mut renderer = renderer(SIZE);
     let scene = Scene::ball(2);
     let look = Look::default();
     let mut cutaway = Cutaway::new();
@@ -123,7 +123,7 @@ fn the_cutaway_matches_the_ray_caster() {
 
 #[test]
 fn lines_and_handles_are_where_the_camera_puts_them() {
-    let Some(mut renderer) = renderer(SIZE) else { return };
+    let mut renderer = renderer(SIZE);
     let camera = Camera::home(&UNIT, aspect());
     let look = Look::default();
     let roi = BoxLines { bounds: UNIT, colour: [1.0, 0.2, 0.1, 1.0], width: 2.0, handles: true };
@@ -153,7 +153,7 @@ fn lines_and_handles_are_where_the_camera_puts_them() {
 
 #[test]
 fn pictures_are_repeatable_and_follow_the_size() {
-    let Some(mut renderer) = renderer(SIZE) else { return };
+    let mut renderer = renderer(SIZE);
     let mut surface = IsoSurface::new();
     surface.extract(&Scene::ball(5).view(), 0.2);
     renderer.set_surface(0, &Triangles::from(&surface), None).unwrap();
@@ -203,7 +203,7 @@ fn volume_difference(
 
 #[test]
 fn gpu_matches_cpu_in_volumes() {
-    let Some(mut renderer) = renderer(SIZE) else { return };
+    let mut renderer = renderer(SIZE);
     let scenes = [("ball", Scene::ball(10)), ("hollow", twin::hollow())];
     for (scene_name, scene) in &scenes {
         for (medium_name, medium) in &twin::media() {

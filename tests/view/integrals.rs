@@ -166,7 +166,7 @@ fn pictures_have_the_integrals_of_theory() {
     use tetralod::geom::{Camera, Projection};
 
     const SIZE: [u32; 2] = [120, 90];
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let mut outside = Camera::home(&UNIT, twin::aspect(SIZE));
     outside.orbit(0.2, 0.05);
     let mut parallel = outside;

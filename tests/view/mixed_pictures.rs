@@ -74,7 +74,7 @@ fn cameras() -> Vec<(&'static str, Camera)> {
 
 #[test]
 fn mixed_pictures_are_those_of_the_twin() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let [(_, fog), _] = twin::media();
     let pixels = SIZE[0] as usize * SIZE[1] as usize;
     for (mesh, scene, cases) in
@@ -121,7 +121,7 @@ fn ball(radius: f64, parts: u32) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
 
 #[test]
 fn lists_get_as_long_as_pictures_need() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let empty = Scene::default();
     let mut mixed = Mixed::new(&empty, None, twin::plain());
     for i in 0..12_u8 {

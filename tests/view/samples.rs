@@ -47,7 +47,7 @@ fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 
 #[test]
 fn the_mean_of_many_pictures_gets_to_what_pixels_cover() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let scene = Scene::ball(10);
     let fog = Medium::new(&[(-1.0, [0.1, 0.3, 0.9, 0.0]), (1.0, [1.0, 0.6, 0.2, 0.7])], 0.5);
     for (name, opacity, has_fog) in [("opaque", 1.0, false), ("translucent", 0.4, false), ("fog", 1.0, true)]
@@ -76,7 +76,7 @@ fn the_mean_of_many_pictures_gets_to_what_pixels_cover() {
 
 #[test]
 fn lines_do_not_blur_in_the_mean() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let lines = BoxLines { bounds: UNIT, colour: [1.0, 0.9, 0.2, 1.0], width: 1.0, handles: true };
     renderer.set_boxes(&[lines]).unwrap();
     let [one, many] = [1, 16].map(|pictures| mean(&mut renderer, &twin::plain(), pictures));
@@ -88,7 +88,7 @@ fn lines_do_not_blur_in_the_mean() {
 
 #[test]
 fn what_is_drawn_on_nothing_can_be_laid_over_anything() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let scene = Scene::ball(8);
     let fog = Medium::new(&[(-1.0, [0.1, 0.3, 0.9, 0.0]), (1.0, [1.0, 0.6, 0.2, 0.7])], 0.5);
     let lines = BoxLines { bounds: UNIT, colour: [1.0, 0.9, 0.2, 0.8], width: 2.0, handles: true };

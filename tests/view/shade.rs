@@ -104,7 +104,7 @@ fn assert_none(renderer: &mut Renderer, name: &str) {
 
 #[test]
 fn flat_surfaces_of_any_triangles_get_no_shade() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     // Wide triangles, small ones, slivers; across the view and along it.
     for (name, cells) in [("wide", [1, 1]), ("small", [60, 60]), ("slivers", [200, 3])] {
         for (tilt, along) in [("steep", DVec3::new(0.1, 0.2, 0.95)), ("level", DVec3::new(0.0, 0.9, 0.05))] {
@@ -117,7 +117,7 @@ fn flat_surfaces_of_any_triangles_get_no_shade() {
 
 #[test]
 fn convex_bodies_of_any_facets_get_no_shade() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     for radii in [DVec3::splat(0.45), DVec3::new(0.48, 0.2, 0.06)] {
         for splits in [0, 1, 2, 3, 5] {
             Surface::ellipsoid(splits, radii).show(&mut renderer, 0);
@@ -128,7 +128,7 @@ fn convex_bodies_of_any_facets_get_no_shade() {
 
 #[test]
 fn silhouettes_before_what_is_far_behind_get_no_shade() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     Surface::ellipsoid(2, DVec3::splat(0.2)).show(&mut renderer, 0);
     for (key, axis) in [(1, 0), (2, 1), (3, 2)] {
         // Walls around it, farther away than the shade reaches; where two of them meet there is shade.
@@ -152,7 +152,7 @@ fn silhouettes_before_what_is_far_behind_get_no_shade() {
 
 #[test]
 fn hollows_get_shade_as_far_as_it_reaches_and_evenly() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     // A valley whose sides rise by 45 degrees, along y.
     let valley = |x: f64, y: f64| DVec3::new(x, y, 0.5 + (x - 0.5).abs());
     Surface::grid([2, 1], valley).show(&mut renderer, 0);

@@ -62,7 +62,7 @@ fn strays(renderer: &mut Renderer, name: &str) -> [usize; 2] {
 
 #[test]
 fn the_back_of_a_closed_surface_is_never_seen() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     for (name, cells, bumps) in [("smooth", 20, 0.0), ("bumpy", 20, 0.12), ("fine", 40, 0.12)] {
         let mut surface = IsoSurface::new();
         surface.extract(&bumpy(cells, bumps).view(), 0.5);
@@ -78,7 +78,7 @@ fn the_back_of_a_closed_surface_is_never_seen() {
 
 #[test]
 fn each_side_of_an_open_surface_has_its_colour() {
-    let Some(mut renderer) = twin::renderer(SIZE) else { return };
+    let mut renderer = twin::renderer(SIZE);
     let whole = bumpy(20, 0.12);
     // Of the domain a part alone, which cuts the surface open.
     let is_kept = |tet: &&[u32; 4]| tet.iter().all(|p| whole.positions[*p as usize][0] < 0.51);

@@ -6,23 +6,14 @@ use crate::support::meshes::{blocks, linear};
 use glam::{DVec2, DVec3};
 use std::path::Path;
 use tetralod::geom::{Bounds, Camera, Ray};
-use tetralod::gpu::{Colouring, GpuError, Lighting, Look, Renderer, Style, wait};
+use tetralod::gpu::{Colouring, Lighting, Look, Renderer, Style, wait};
 use tetralod::view::{Medium, Triangles};
 
 pub const UNIT: Bounds = Bounds { min: [0.0; 3], max: [1.0; 3] };
 
-/// A renderer, or `None` after saying that this machine has no adapter. Set `TETRALOD_NEED_GPU` to make that
-/// a failure.
-pub fn renderer(size: [u32; 2]) -> Option<Renderer> {
-    match wait(Renderer::headless(size)) {
-        Ok(renderer) => Some(renderer),
-        Err(GpuError::NoAdapter(why)) => {
-            assert!(std::env::var_os("TETRALOD_NEED_GPU").is_none(), "no Vulkan adapter: {why}");
-            println!("skipped: no Vulkan adapter");
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
+/// A renderer. A Vulkan driver is needed, for which software will do.
+pub fn renderer(size: [u32; 2]) -> Renderer {
+    wait(Renderer::headless(size)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The bytes of a picture: red, green, blue, opacity.

@@ -36,31 +36,23 @@ fn find() -> Option<Browser> {
 
 const FIREFOXES: [&str; 2] = ["firefox-esr", "firefox"];
 
-/// Firefox, for tests that need no GPU: the variable FIREFOX, what PATH has, or a fresh installation. None after saying so where it
-/// cannot be installed; set `TETRALOD_NEED_FIREFOX` to make that a failure.
-pub fn firefox() -> Result<Option<PathBuf>> {
+/// Firefox, for tests that need no GPU: the variable FIREFOX, what PATH has, or a fresh installation.
+pub fn firefox() -> Result<PathBuf> {
     let find = || FIREFOXES.iter().find_map(|name| shell::find(name));
     let given = std::env::var_os("FIREFOX").map(PathBuf::from).filter(|path| path.is_file());
     if let Some(found) = given.or_else(find) {
-        return Ok(Some(found));
+        return Ok(found);
     }
-    match install_packages(
+    install_packages(
         "Firefox",
         &["firefox-esr"],
         "Firefox is needed: install it, or set FIREFOX to its path",
-    ) {
-        Ok(()) => Ok(Some(find().context("Firefox was installed but `firefox-esr` is not in PATH")?)),
-        Err(error) if std::env::var_os("TETRALOD_NEED_FIREFOX").is_none() => {
-            println!("skipped: the tests in Firefox ({error:#})");
-            Ok(None)
-        }
-        Err(error) => Err(error),
-    }
+    )?;
+    find().context("Firefox was installed but `firefox-esr` is not in PATH")
 }
 
-/// Has a Vulkan adapter for the renderer's tests: what is there, or on Debian Mesa's in software. Says so where there is none;
-/// set `TETRALOD_NEED_GPU` to have tests fail that need one.
-pub fn vulkan_adapter() -> Result<()> {
+/// Has a Vulkan driver for the renderer's tests: what is there, or on Debian Mesa's in software.
+pub fn vulkan_driver() -> Result<()> {
     let is_named =
         ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].iter().any(|name| std::env::var_os(name).is_some());
     let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
@@ -69,13 +61,7 @@ pub fn vulkan_adapter() -> Result<()> {
         return Ok(());
     }
     let by_hand = "the tests of the renderer need a Vulkan driver: install one, such as Mesa's in software (`mesa-vulkan-drivers`)";
-    match install_packages("a Vulkan driver", &["mesa-vulkan-drivers"], by_hand) {
-        Err(error) if std::env::var_os("TETRALOD_NEED_GPU").is_none() => {
-            println!("skipped: what draws natively ({error:#})");
-            Ok(())
-        }
-        installed => installed,
-    }
+    install_packages("a Vulkan driver", &["mesa-vulkan-drivers"], by_hand)
 }
 
 const BY_HAND: &str = "Chromium and chromedriver are needed: install the packages `chromium` and `chromium-driver` \

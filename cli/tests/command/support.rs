@@ -117,27 +117,6 @@ pub fn bad(code: i32, arguments: &[&str], words: &[&str]) {
     }
 }
 
-/// Whether pictures can be drawn; says if not, unless TETRALOD_NEED_GPU makes that a failure.
-#[cfg(feature = "render")]
-pub fn has_adapter() -> bool {
-    use std::sync::LazyLock;
-    static HAS: LazyLock<bool> = LazyLock::new(|| {
-        let folder = Folder::new("adapter");
-        let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
-        bucky(3, &input, &mt);
-        let output = run(&["render", &mt, "-o", &out, "--size", "8x8", "--samples", "1"]);
-        let error = text(&output.stderr);
-        let has_none = error.contains("there is no Vulkan adapter");
-        assert!(output.status.success() || has_none, "{error}");
-        assert!(!has_none || std::env::var_os("TETRALOD_NEED_GPU").is_none(), "{error}");
-        !has_none
-    });
-    if !*HAS {
-        println!("skipped: no Vulkan adapter");
-    }
-    *HAS
-}
-
 pub fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("{key} is a number: {value}"))
 }
