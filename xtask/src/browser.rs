@@ -1,4 +1,5 @@
-//! Chromium with WebGPU, and Firefox: finding them, installing them where that is allowed, and running wasm tests in Chromium.
+//! Programs of the system that tests need, Chromium with WebGPU above all: finding them, installing them where that is allowed, and
+//! running wasm tests in Chromium.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -49,6 +50,22 @@ pub fn firefox() -> Result<PathBuf> {
         "Firefox is needed: install it, or set FIREFOX to its path",
     )?;
     find().context("Firefox was installed but `firefox-esr` is not in PATH")
+}
+
+/// nginx, for which the documentation has a configuration: where Debian, other systems and Homebrew put it, or a fresh installation.
+pub fn nginx() -> Result<PathBuf> {
+    let find = || {
+        let places =
+            ["/usr/sbin/nginx", "/usr/local/bin/nginx", "/opt/homebrew/bin/nginx"].map(PathBuf::from);
+        shell::find("nginx").or_else(|| places.into_iter().find(|path| path.is_file()))
+    };
+    if let Some(found) = find() {
+        return Ok(found);
+    }
+    let by_hand =
+        "nginx is needed, to test the configuration of docs/hosting.md: install it (Debian: `nginx-light`)";
+    install_packages("nginx", &["nginx-light"], by_hand)?;
+    find().context("nginx was installed but is not there")
 }
 
 /// Has a Vulkan driver for the renderer's tests: what is there, or on Debian Mesa's in software.

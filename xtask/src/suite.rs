@@ -294,7 +294,7 @@ fn pages() -> Result<()> {
     shell::install_node_packages(Path::new(docs::SOURCES))?;
     let mut command = node_test("docs.test.js");
     command.env("TETRALOD", shell::tested_command()?).env("CHROMIUM", browser::require()?.chromium);
-    shell::run(&mut command)
+    shell::run(command.env("NGINX", browser::nginx()?))
 }
 
 /// The projects of `examples/js`, with the packed package, in headless Chromium and in Node.
