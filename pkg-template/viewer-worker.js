@@ -214,6 +214,11 @@ const methods = {
     }
   },
 
+  /** Resolves when the picture shows what is set, with all its pixels, and the GPU has finished it. */
+  async pictured() {
+    while (!broken && (viewer.pending || resting !== undefined || viewer.inFlight > 0)) await drawn();
+  },
+
   retry: () => parts?.retry(),
 
   halt() {
@@ -342,7 +347,7 @@ const methods = {
     return viewer.hash();
   },
 };
-const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled", "hash"]);
+const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled", "pictured", "hash"]);
 
 /** The first bytes of a file that will be opened. @type {{ url: string, range: string, response: Promise<Response> } | undefined} */
 let ahead;

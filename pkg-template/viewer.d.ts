@@ -465,8 +465,9 @@ export class Viewer extends EventTargetWithMeshTools {
    */
   open(source: Source, options?: ViewerOpenOptions): Promise<OpenedVolume>;
   /**
-   * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, and all
-   * data that it needs has arrived. Rejects with the error that prevents it.
+   * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, all
+   * data that it needs has arrived, and the picture shows it. Pages that are hidden draw no pictures, and wait for none. Rejects with the
+   * error that prevents it.
    */
   settled(options?: { signal?: AbortSignal | undefined }): Promise<void>;
   /** Continues such a file after an error. Rejects with `changed` if it was replaced on the server: open it again. */

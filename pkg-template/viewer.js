@@ -306,7 +306,7 @@ export class Viewer extends withMeshTools(EventTarget) {
       resolve();
     };
     signal.addEventListener("abort", () => clearTimeout(unasked), { once: true });
-    const finished = abortable(promise.then(() => this.settled()), signal);
+    const finished = abortable(promise.then(() => this.#atRest()), signal);
     // The worker reports errors by itself.
     finished.catch(() => {});
     this.#emit("progress", opened.progress);
@@ -315,14 +315,32 @@ export class Viewer extends withMeshTools(EventTarget) {
   }
 
   /**
-   * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, and all
-   * data that it needs has arrived.
+   * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, all
+   * data that it needs has arrived, and the picture shows it. Pages that are hidden draw no pictures, and wait for none.
    *
    * @param {{ signal?: AbortSignal }} [how]
    */
   async settled({ signal } = {}) {
     signal?.throwIfAborted();
-    await abortable(this.#sent().then(() => this.#remote.call("settled")), signal);
+    await abortable(this.#atRest().then(() => this.#pictured()), signal);
+  }
+
+  /** Resolves when the mesh is at rest. */
+  async #atRest() {
+    await this.#sent();
+    await this.#remote.call("settled");
+  }
+
+  /** Resolves when the picture shows what is set, or the page is hidden. */
+  async #pictured() {
+    if (document.hidden) return;
+    const { promise: hidden, resolve } = deferred();
+    document.addEventListener("visibilitychange", resolve);
+    try {
+      await Promise.race([this.#remote.call("pictured"), hidden]);
+    } finally {
+      document.removeEventListener("visibilitychange", resolve);
+    }
   }
 
   /** Resolves when the worker has all that was set. */
