@@ -16,9 +16,14 @@ const BOXES: usize = 12;
 const WALKS: usize = 8;
 const PLACES: u64 = 4;
 
+/// Of large meshes most requests for values are for those in a part of about so many tetrahedra: what was asked for before is as likely to
+/// matter there as everywhere. One in so many is for the whole domain.
+const PART_TETS: f64 = 50_000.0;
+const WHOLE: usize = 10;
+
 /// One in so many requests starts from the base mesh, and one in so many comes by the reference mesh.
 const FRESH: u32 = 3;
-const THROUGH: u32 = 8;
+const THROUGH: u32 = 24;
 
 const ERRORS: [f64; 5] = [0.01, 0.0, 0.003, 0.03, 0.001];
 
@@ -42,9 +47,9 @@ impl Numbers {
 /// Isovalues all over the range of each field, values of reference vertices, bands, boxes, and cameras that move, in random order.
 pub fn requests(mt: &impl ApplyUpdates, input: &TetMesh) -> Vec<Query> {
     let mut numbers = Numbers(0x9E37_79B9_7F4A_7C15);
-    let mut all: Vec<Vec<Query>> =
-        values(mt.info(), input, &mut numbers).into_iter().map(|one| vec![one]).collect();
     let whole = Bounds::of(&input.positions);
+    let mut all: Vec<Vec<Query>> =
+        values(mt.info(), input, &whole, &mut numbers).into_iter().map(|one| vec![one]).collect();
     for _ in 0..BOXES {
         let error = ERRORS[all.len() % ERRORS.len()];
         let (mut low, mut high) = (whole.min, whole.max);
@@ -64,8 +69,9 @@ pub fn requests(mt: &impl ApplyUpdates, input: &TetMesh) -> Vec<Query> {
     all.into_iter().flatten().collect()
 }
 
-fn values(info: &MtInfo, input: &TetMesh, numbers: &mut Numbers) -> Vec<Query> {
+fn values(info: &MtInfo, input: &TetMesh, whole: &Bounds, numbers: &mut Numbers) -> Vec<Query> {
     let mut all = Vec::new();
+    let side = (PART_TETS / f64::from(info.tetrahedra.max(1))).cbrt();
     let each = (VALUES / info.fields.len()).max(2);
     for (f, field) in info.fields.iter().enumerate() {
         let known = input.fields.iter().find(|known| field.is_of(known));
@@ -81,6 +87,13 @@ fn values(info: &MtInfo, input: &TetMesh, numbers: &mut Numbers) -> Vec<Query> {
                 (format!("{} from {value} to {to}", field.name), need.between(f, vec![[value, to]]))
             } else {
                 (format!("{} = {value}", field.name), need.around(f, &[value]))
+            };
+            let (name, need) = if side < 1.0 && all.len() % WHOLE > 0 {
+                let low = [0; 3].map(|_| (1.0 - side) * numbers.part());
+                let part = Bounds { min: place(whole, low), max: place(whole, low.map(|x| x + side)) };
+                (format!("{name} in {:?} to {:?}", part.min, part.max), need.inside(part))
+            } else {
+                (name, need)
             };
             all.push(Query::new(&format!("{name}, error {error}"), need));
         }
