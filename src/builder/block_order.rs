@@ -311,4 +311,37 @@ mod tests {
             assert!(now <= 17 + 6, "{now} blocks for the updates of 17, {before} in the order by depth");
         }
     }
+
+    /// Layers of updates on a line, each of which depends on two of the layer before and touches more than these. All errors are equal.
+    #[test]
+    fn updates_come_behind_all_of_their_parents() {
+        let (layers, width) = (16, 64);
+        let count = layers * width;
+        let parents_of = |u: u32| match u.checked_sub(width) {
+            Some(above) if above % width + 1 < width => vec![above, above + 1],
+            Some(above) => vec![above],
+            None => Vec::new(),
+        };
+        let parents: Vec<u32> = (0..count).flat_map(parents_of).collect();
+        let mut starts = vec![0];
+        (0..count).for_each(|u| starts.push(starts[u as usize] + parents_of(u).len() as u32));
+        let touched = |u: u32| [u % width, u / width].map(|x| x as i32);
+        let boxes: Vec<[[i32; 3]; 2]> =
+            (0..count).map(touched).map(|[at, by]| [[at - by, 0, 0], [at + by + 1, 1, 1]]).collect();
+        let updates = Updates {
+            base: 1,
+            near: &vec![0; count as usize],
+            starts: &starts,
+            parents: &parents,
+            boxes: &boxes,
+            errors: &vec![ErrorCode::at_least(0.1); count as usize],
+            domain: None,
+        };
+        let mut numbers = vec![u32::MAX; count as usize];
+        for (number, u) in (0..).zip(updates.order(4)) {
+            assert!(parents_of(u).iter().all(|&p| numbers[p as usize] < number), "{u}");
+            assert_eq!(std::mem::replace(&mut numbers[u as usize], number), u32::MAX);
+        }
+        assert!(!numbers.contains(&u32::MAX));
+    }
 }

@@ -608,6 +608,16 @@ mod tests {
         let mut source = Source::new(Reader::new(&bytes, 0), &models)?;
         source.symbol(SMALL, 0)?;
         assert!(source.end().is_err());
+        // There is a byte more than what was put takes.
+        bytes.push(0);
+        let mut source = Source::new(Reader::new(&bytes, 0), &models)?;
+        for (i, &x) in (0..).zip(&all[..10]) {
+            source.symbol(SMALL, i % 2)?;
+            source.number(NUMBERS, x % 3)?;
+            source.signed(NUMBERS, 2)?;
+            source.bits(i % 33)?;
+        }
+        assert!(source.end().is_err());
         // Tables of other contexts, and such that do not add up.
         let mut tables = Vec::new();
         models.write(&mut tables);

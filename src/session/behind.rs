@@ -59,3 +59,41 @@ fn clip(ranges: &mut Vec<Range<u32>>, len: u32) {
         last.end = last.end.min(len);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOST: u32 = 6;
+
+    /// The numbers of a set of bits, as ranges.
+    fn ranges(bits: u32) -> Vec<Range<u32>> {
+        let mut ranges: Vec<Range<u32>> = Vec::new();
+        for i in (0..MOST).filter(|i| bits >> i & 1 == 1) {
+            match ranges.last_mut() {
+                Some(last) if last.end == i => last.end += 1,
+                _ => ranges.push(i..i + 1),
+            }
+        }
+        ranges
+    }
+
+    #[test]
+    fn what_several_changes_have_in_all_is_taken_once() {
+        let change = |bits: u32| MeshChanges { vertices: ranges(bits), tets: ranges(bits) };
+        for (a, b) in (0..1 << MOST).flat_map(|a| (0..1 << MOST).map(move |b| (a, b))) {
+            let mut behind = Behind::default();
+            assert_eq!(
+                behind.take(4, 5),
+                MeshChanges { vertices: ranges(0b1111), tets: ranges(0b11111) },
+                "everything"
+            );
+            behind.add(&change(a), false);
+            behind.add(&change(b), false);
+            // A mesh of four points and all tetrahedra.
+            let both = MeshChanges { vertices: ranges((a | b) & 0b1111), tets: ranges(a | b) };
+            assert_eq!(behind.take(4, MOST as usize), both, "{a:b} and {b:b}");
+            assert_eq!(behind.take(4, MOST as usize), MeshChanges::default(), "it is taken");
+        }
+    }
+}

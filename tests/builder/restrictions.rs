@@ -119,13 +119,13 @@ fn labelled(regions: Regions) -> TetMesh {
 }
 
 /// Six times the volume of each region in steps of the lattice, exactly. Each cell must be in one region as a whole.
-fn volumes(info: &MtInfo, mesh: &CurrentMesh, regions: Regions) -> BTreeMap<i64, i128> {
+fn volumes(info: &MtInfo, mesh: &CurrentMesh, region_of: impl Fn([f64; 3]) -> i64) -> BTreeMap<i64, i128> {
     let mut volumes = BTreeMap::new();
     for tet in mesh.tets() {
         let lattice = tet.map(|v| mesh.positions()[v as usize]);
         let corners = lattice.map(|q| info.lattice.point(q));
         let middle = centre(corners);
-        let region = regions(block(middle));
+        let region = region_of(middle);
         // All over the cell, but not on the interfaces that it touches.
         for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
             for part in [0.3, 0.6, 0.99] {
@@ -133,7 +133,7 @@ fn volumes(info: &MtInfo, mesh: &CurrentMesh, regions: Regions) -> BTreeMap<i64,
                     let far = 0.5 * (corners[i][k] + corners[j][k]);
                     middle[k] + part * (far - middle[k])
                 });
-                assert_eq!(regions(block(p)), region, "{corners:?}");
+                assert_eq!(region_of(p), region, "{corners:?}");
             }
         }
         let [a, b, c, d] = lattice;
@@ -162,7 +162,7 @@ fn regions_keep_their_volumes_and_no_cell_is_in_two() {
             let mt = made(&mesh, &BuildConfig { preserve: vec!["material".into()], ..config });
             let mut whole = None;
             at_all_errors(&mt, |mesh, error| {
-                let found = volumes(mt.info(), mesh, regions);
+                let found = volumes(mt.info(), mesh, |p| regions(block(p)));
                 assert_eq!(*whole.get_or_insert(found.clone()), found, "{name} at error {error}");
             });
             let base = mt.base().tets.len();
@@ -172,6 +172,52 @@ fn regions_keep_their_volumes_and_no_cell_is_in_two() {
                 mesh.tets.len()
             );
         }
+    }
+}
+
+/// How far an interface in the middle of the cube is raised over a column of points, in blocks.
+///
+/// ```text
+///  y │    ╱╲   B            along x; at the side x = 0 it is straight in z, and
+///  4 ├───╱  ╲────╱╲──       what bends it is next to that line.
+///    │  A        ╱  ╲
+///    └──────────────── x
+/// ```
+fn raised([x, z]: [u32; 2]) -> f64 {
+    if x > 0 && (5 * x + 3 * z) % 7 < 3 { 0.25 } else { 0.0 }
+}
+
+/// The region of a point beside that interface, which is straight on the triangles of the grid.
+fn beside_raised(p: [f64; 3]) -> i64 {
+    let [x, y, z] = p.map(|x| x * f64::from(N));
+    let [i, k] = [x, z].map(|x| (x as u32).min(N - 1));
+    let [f, g] = [x - f64::from(i), z - f64::from(k)];
+    let [near, far] = [raised([i, k]), raised([i + 1, k + 1])];
+    let at = if f > g { raised([i + 1, k]) } else { raised([i, k + 1]) };
+    let height = near + (at - near) * f.max(g) + (far - at) * f.min(g);
+    i64::from(y < 4.0 + height)
+}
+
+#[test]
+fn interfaces_that_bend_beside_straight_lines_stay() {
+    let mut mesh = cube(9);
+    for p in &mut mesh.positions {
+        let [i, j, k] = p.map(|x| (x * f64::from(N)).round() as u32);
+        let weight =
+            [(4, 1.0), (3, 0.5), (5, 0.5)].iter().find(|(row, _)| *row == j).map_or(0.0, |(_, w)| *w);
+        p[1] += weight * raised([i, k]) / f64::from(N);
+    }
+    mesh.grid = None;
+    let corners = |tet: &[u32; 4]| tet.map(|v| mesh.positions[v as usize]);
+    let labels = mesh.tets.iter().map(|tet| beside_raised(centre(corners(tet))) as f64).collect();
+    mesh.cell_fields = vec![Field::new("material", labels)];
+    for config in [BuildConfig::default(), of(MtKind::Vertex, Method::Decimate, BuildCriterion::HalfEdge)] {
+        let mt = made(&mesh, &BuildConfig { preserve: vec!["material".into()], ..config });
+        let mut whole = None;
+        at_all_errors(&mt, |mesh, error| {
+            let found = volumes(mt.info(), mesh, beside_raised);
+            assert_eq!(*whole.get_or_insert(found.clone()), found, "at error {error}");
+        });
     }
 }
 
@@ -196,7 +242,7 @@ fn parts_keep_regions_and_points() {
             assert!(report.valid, "{name}, {parts}: {:#?}", report.failures);
             let mut first = None;
             at_all_errors(&mt, |mesh, error| {
-                let found = volumes(mt.info(), mesh, regions);
+                let found = volumes(mt.info(), mesh, |p| regions(block(p)));
                 assert_eq!(*first.get_or_insert(found.clone()), found, "{name}, {parts} at error {error}");
                 for place in &config.keep_points {
                     let q = mt.info().lattice.nearest(*place);
@@ -222,7 +268,7 @@ fn labels_at_points_part_cells_by_the_least_one() {
     let mt = made(&mesh, &BuildConfig { preserve: vec!["material".into()], ..BuildConfig::default() });
     let mut whole = None;
     at_all_errors(&mt, |mesh, error| {
-        let found = volumes(mt.info(), mesh, regions);
+        let found = volumes(mt.info(), mesh, |p| regions(block(p)));
         assert_eq!(found.len(), 2);
         assert_eq!(*whole.get_or_insert(found.clone()), found, "at error {error}");
     });

@@ -8,6 +8,7 @@ mod half_edge_pages;
 mod hand_made;
 mod hostile;
 mod layers;
+mod rounding;
 #[path = "../support/mod.rs"]
 mod support;
 mod vertex_tree;

@@ -568,6 +568,23 @@ fn another_version_of_the_file_is_never_mixed_in() {
     }
 }
 
+/// Servers that compress on their way, for one, give the same bytes other weak tags.
+#[test]
+fn weak_tags_tell_no_versions_apart() {
+    let mut loader = Loader::new(small());
+    loader.want(&[wanted(0..10, 0.0), wanted(100..200, -1.0)]);
+    assert_eq!(fetches(&mut loader, 0), [(1, 0..10)]);
+    let head = |range, etag| ResponseHead { content_range: Some(range), etag: Some(etag), ..GOOD };
+    loader.head(1, 0, &head("bytes 0-9/3000", "W/\"one\""));
+    loader.data(1, 0, &bytes(0..10));
+    assert_eq!(loader.version(), None);
+    let asked = actions(&mut loader, 0);
+    let [Action::Fetch { id, if_match: None, .. }] = asked[..] else { panic!("{asked:?}") };
+    loader.head(id, 0, &head("bytes 100-199/3000", "W/\"two\""));
+    loader.data(id, 0, &bytes(100..200));
+    assert_eq!(loader.error(), None);
+}
+
 #[test]
 fn the_end_of_the_file_is_found_without_being_told() {
     let mut loader = Loader::new(small());

@@ -273,6 +273,7 @@ fn exact(plan: &Plan, values: &[f64], vertices: &[VertexId]) -> Vec<Exact> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mt::BaseMesh;
 
     #[test]
     fn every_update_has_one_number_and_nodes_begin_with_blocks() {
@@ -293,5 +294,23 @@ mod tests {
         assert_eq!((first(1, 0), first(0, 0)), (Some(0), Some(37)));
         assert_eq!(first(0, 3).map(|first| first % 16), Some(0));
         assert!(numbers.of(Made { node: node(0, 4), update: 0 }).is_err());
+    }
+
+    #[test]
+    fn points_are_inserted_once_each_and_next_to_one_that_is_there() {
+        // Points 0 and 1 are in the base mesh.
+        let base =
+            || Numbered { mesh: BaseMesh::default(), number: vec![0, 1, NONE, NONE], places: Vec::new() };
+        let check = |vertices: [u32; 2], near: [u32; 2]| {
+            Listed { numbers: Numbers::new(&[], 4), vertices: vertices.to_vec(), near: near.to_vec() }
+                .check(&base())
+        };
+        assert!(check([2, 3], [0, 2]).is_ok());
+        assert!(check([3, 2], [1, 3]).is_ok());
+        for (vertices, near) in
+            [([2, 3], [3, 2]), ([2, 3], [2, 0]), ([2, 2], [0, 1]), ([2, 1], [0, 0]), ([2, 4], [0, 0])]
+        {
+            assert!(check(vertices, near).is_err(), "{vertices:?} next to {near:?}");
+        }
     }
 }

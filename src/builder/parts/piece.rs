@@ -271,3 +271,81 @@ impl PartUpdates {
 fn expect(holds: bool, what: &'static str) -> Result<(), &'static str> {
     if holds { Ok(()) } else { Err(what) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{build_part, part};
+    use super::*;
+    use crate::builder::BuildConfig;
+    use crate::mesh::{Field, Grid, TetMesh};
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+    use std::ops::ControlFlow;
+
+    /// What is wrong, and how it gets so.
+    type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
+
+    /// A part as it is written first, and when it has been built, with its updates.
+    fn parts() -> (Part, Part, PartUpdates) {
+        let grid = Grid { dims: [9; 3], origin: [0.0; 3], spacing: [1.0; 3] };
+        let values = (0..9_u32.pow(3)).map(|i| f64::from(i * i % 997)).collect();
+        let mesh = TetMesh::from_grid(grid, vec![Field::new("h", values)]);
+        let mut first = None;
+        let put = &mut |part| {
+            first.get_or_insert(part);
+            Ok(())
+        };
+        part(&mesh, &BuildConfig::default(), 2, BTreeMap::new(), put).expect("a mesh that can be parted");
+        let first = first.expect("a part");
+        let (built, updates) =
+            build_part(first.clone(), &mut |_| ControlFlow::Continue(())).expect("a part to build");
+        (first, built, updates)
+    }
+
+    #[test]
+    fn content_with_good_checksums_is_not_trusted() {
+        let (first, built, updates) = parts();
+        let beyond = first.piece.points.len() as u32;
+        let changes: [Change<'_, Piece>; 12] = [
+            ("a tetrahedron inside out", &|p| p.tets[0].swap(0, 1)),
+            ("a flat tetrahedron", &|p| p.tets[0][1] = p.tets[0][0]),
+            ("a corner that is no point", &|p| p.tets[0][3] = beyond),
+            ("points out of order", &|p| p.points.swap(3, 4)),
+            ("a point that the whole lacks", &|p| p.points[beyond as usize - 1] = u32::MAX),
+            ("a point off the lattice", &|p| p.positions[0][1] = -1),
+            ("no number", &|p| p.values[0] = f64::NAN),
+            ("a value too few", &|p| p.values.truncate(1)),
+            ("no tetrahedra", &|p| p.tets.clear()),
+            ("a bucket of no tetrahedron", &|p| p.inside.push((0, u32::MAX))),
+            ("a mark of no update", &|p| p.makers = vec![p.earlier.len() as u32; p.tets.len()]),
+            ("a kept point that is none", &|p| p.kept.push(beyond)),
+        ];
+        for (what, change) in changes {
+            for part in [&first, &built] {
+                let mut part = part.clone();
+                change(&mut part.piece);
+                let mut bytes = Vec::new();
+                if part.head.built { part.write_built(&updates, &mut bytes) } else { part.write(&mut bytes) }
+                    .expect("bytes");
+                let read = Part::read(&mut Cursor::new(&bytes));
+                assert!(matches!(read, Err(PartsError::Damaged { .. })), "{what}");
+            }
+        }
+        let changes: [Change<'_, UpdateRows>; 6] = [
+            ("a vertex that the whole lacks", &|r| r.vertices[0] = u32::MAX),
+            ("a near vertex that the whole lacks", &|r| r.near[0] = u32::MAX),
+            ("an update without an error", &|r| r.errors.clear()),
+            ("a tetrahedron too many", &|r| r.stars[0] += 1),
+            ("a remover that is no update", &|r| r.removers[0] = u32::MAX),
+            ("a remover that was none before", &|r| r.removers[0] = 2 * r.earlier.len() as u32 + 2),
+        ];
+        for (what, change) in changes {
+            let mut updates = updates.clone();
+            change(&mut updates.rows);
+            let mut bytes = Vec::new();
+            built.write_built(&updates, &mut bytes).expect("bytes");
+            let read = PartUpdates::read(&mut Cursor::new(&bytes));
+            assert!(matches!(read, Err(PartsError::Damaged { .. })), "{what}");
+        }
+    }
+}

@@ -305,3 +305,20 @@ impl ExplicitMt {
         self.removed_by(t).map(Some).ok_or(UpdateError::Cavity { update: u.0 })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_bare_is_noticed_wherever_its_number_is() {
+        let new = [[3, 4, 5, 6]];
+        let occupancy = FaceOccupancy::by(&new);
+        let fits = |bare: &[[u32; 3]]| {
+            let beyond: Vec<(Side, u32, u32)> = bare.iter().map(|&face| (side_of((face, 0)), 9, 1)).collect();
+            meet(&new, &beyond, &occupancy).is_some()
+        };
+        assert!(fits(&[]));
+        assert!(![[0, 1, 2], [3, 4, 7], [7, 8, 9]].iter().any(|&face| fits(&[face])));
+    }
+}
