@@ -37,7 +37,7 @@ pub fn run(args: &[String]) -> Result<()> {
     viewer.join().map_err(|_| anyhow!("a thread that builds the viewer panicked"))??;
     if !serve {
         draw_all()?;
-        return package::build(&[]);
+        return package::build_released();
     }
     let mut rest = rest.to_vec();
     rest.extend((!small && has_memory()).then_some(LARGE));
@@ -133,7 +133,7 @@ fn serve_page(tetralod: &Path, port: u16) -> Result<()> {
     let address = format!("\nThe demo is at {}   (Ctrl-C ends it)", server.address);
     println!("{address}");
     // What the page does not load by itself: above all the module that builds files dropped on it.
-    thread::spawn(move || match package::build(&[]) {
+    thread::spawn(move || match package::build_released() {
         Ok(()) => println!("{address}"),
         Err(error) => eprintln!("the page cannot build meshes: {error:#}"),
     });
