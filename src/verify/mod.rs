@@ -24,8 +24,8 @@
 //! - **Answers**: `satisfied` and the bounds are true, budgets are kept, a larger budget never has a larger excess, and
 //!   the same request gives the same mesh after any other request and in any steps, that of the updates which the request needs; repeating
 //!   it changes nothing.
-//! - **History**: a hundred more requests, for values all over the range, for boxes and for cameras that move, some with budgets, in
-//!   random order: from the base mesh, from those of other requests, and by way of the reference mesh.
+//! - **History**: a hundred more requests, for values all over the range (of large meshes, mostly in parts), for boxes and for cameras that
+//!   move, some with budgets, in random order: from the base mesh, from those of other requests, and by way of the reference mesh.
 //! - **Steps**: between them the mesh is valid and within the budget.
 //!
 //! [`run_shown`] checks what a session makes of its meshes.
