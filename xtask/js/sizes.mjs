@@ -18,7 +18,7 @@ const { build } = createRequire(new URL("../../tests/js/package.json", import.me
 /** Bytes. An entry that outgrows its limit needs a reason for a higher one, in the message of the commit that raises it. */
 const LIMITS = {
   ".": 16_900,
-  "./viewer": 7_800,
+  "./viewer": 8_000,
   "./element": 10_500,
   "./three": 2_500,
   "./vtk": 2_500,
