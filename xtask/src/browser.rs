@@ -21,11 +21,21 @@ pub struct Browser {
 
 /// The browser of this machine: the variables CHROMIUM and CHROMEDRIVER, what PATH has, or a fresh installation.
 pub fn require() -> Result<Browser> {
-    if let Some(browser) = find() {
-        return Ok(browser);
+    found_or_installed(find, "Chromium", &["chromium", "chromium-driver"], BY_HAND)
+}
+
+/// What `find` finds, if need be after an installation.
+fn found_or_installed<T>(
+    find: impl Fn() -> Option<T>,
+    what: &str,
+    packages: &[&str],
+    by_hand: &'static str,
+) -> Result<T> {
+    if let Some(found) = find() {
+        return Ok(found);
     }
-    install()?;
-    find().context("Chromium was installed but neither `chromium` nor `chromedriver` is in PATH")
+    install_packages(what, packages, by_hand)?;
+    find().with_context(|| format!("{what} was installed, but is not found"))
 }
 
 fn find() -> Option<Browser> {
@@ -39,17 +49,12 @@ const FIREFOXES: [&str; 2] = ["firefox-esr", "firefox"];
 
 /// Firefox, for tests that need no GPU: the variable FIREFOX, what PATH has, or a fresh installation.
 pub fn firefox() -> Result<PathBuf> {
-    let find = || FIREFOXES.iter().find_map(|name| shell::find(name));
-    let given = std::env::var_os("FIREFOX").map(PathBuf::from).filter(|path| path.is_file());
-    if let Some(found) = given.or_else(find) {
-        return Ok(found);
-    }
-    install_packages(
-        "Firefox",
-        &["firefox-esr"],
-        "Firefox is needed: install it, or set FIREFOX to its path",
-    )?;
-    find().context("Firefox was installed but `firefox-esr` is not in PATH")
+    let find = || {
+        let given = std::env::var_os("FIREFOX").map(PathBuf::from).filter(|path| path.is_file());
+        given.or_else(|| FIREFOXES.iter().find_map(|name| shell::find(name)))
+    };
+    let by_hand = "Firefox is needed: install it, or set FIREFOX to its path";
+    found_or_installed(find, "Firefox", &["firefox-esr"], by_hand)
 }
 
 /// nginx, for which the documentation has a configuration: where Debian, other systems and Homebrew put it, or a fresh installation.
@@ -59,13 +64,9 @@ pub fn nginx() -> Result<PathBuf> {
             ["/usr/sbin/nginx", "/usr/local/bin/nginx", "/opt/homebrew/bin/nginx"].map(PathBuf::from);
         shell::find("nginx").or_else(|| places.into_iter().find(|path| path.is_file()))
     };
-    if let Some(found) = find() {
-        return Ok(found);
-    }
     let by_hand =
         "nginx is needed, to test the configuration of docs/hosting.md: install it (Debian: `nginx-light`)";
-    install_packages("nginx", &["nginx-light"], by_hand)?;
-    find().context("nginx was installed but is not there")
+    found_or_installed(find, "nginx", &["nginx-light"], by_hand)
 }
 
 /// Has a Vulkan driver for the renderer's tests: what is there, or on Debian Mesa's in software.
@@ -83,10 +84,6 @@ pub fn vulkan_driver() -> Result<()> {
 
 const BY_HAND: &str = "Chromium and chromedriver are needed: install the packages `chromium` and `chromium-driver` \
                        (Debian; elsewhere any Chromium 113 or later), or set CHROMIUM and CHROMEDRIVER to their paths";
-
-fn install() -> Result<()> {
-    install_packages("Chromium", &["chromium", "chromium-driver"], BY_HAND)
-}
 
 /// Installs packages of Debian; `by_hand` says what to do where that cannot be done.
 pub fn install_packages(what: &str, packages: &[&str], by_hand: &'static str) -> Result<()> {
