@@ -124,6 +124,11 @@ impl FragmentLists {
         });
     }
 
+    /// Frees the lists: a picture has been drawn that needs none.
+    pub(super) fn clear(&mut self) {
+        self.lists = None;
+    }
+
     fn take_count(&mut self) {
         if let Ok(mut counted) = self.counted.lock()
             && let Count::Of(number) = *counted
@@ -134,7 +139,8 @@ impl FragmentLists {
         }
     }
 
-    /// Whether a picture that was counted had more fragments than room, and more room is to be had.
+    /// Whether a picture that was counted had more fragments than room, and more room is to be had. Never for a picture without lists:
+    /// drawing it again would change nothing.
     pub(super) fn is_short(&mut self, context: &Context) -> bool {
         self.take_count();
         let largest = context.largest_buffer(wgpu::BufferUsages::STORAGE) / (4 * NODE);

@@ -457,7 +457,10 @@ impl Renderer {
     fn draw_beside(&mut self, view: &wgpu::TextureView, camera: &Camera, look: &Look, count: u32) {
         let ([width, height], [drawn, _]) = (self.target.size, self.target.drawn_size);
         let part = (self.split * f64::from(width)).round() as u32;
-        let Some(other) = self.beside.as_mut().filter(|_| part > 0) else { return };
+        let Some(other) = &mut self.beside else { return };
+        if part == 0 {
+            return other.lists.clear();
+        }
         other.resize([width, height]);
         other.set_scale(f64::from(drawn) / f64::from(width));
         other.encode(&PictureView { view, part: Some([0, 0, part, height]) }, camera, look, count);
@@ -483,6 +486,8 @@ impl Renderer {
         if has_lists {
             self.composite.prepare(&self.context, &self.common, &self.lists);
             self.list(&mut encoder);
+        } else {
+            self.lists.clear();
         }
         self.opaque(&mut encoder, !look.clips.is_empty(), has_more);
         if has_shade {

@@ -90,13 +90,15 @@ export async function still(page, name) {
   return study(page, png);
 }
 
-/** Waits until the viewer is at rest, and no frame has been drawn for a while. */
+/** Waits until the viewer is at rest, and no frame has been drawn for a while; fails with what still goes on. */
 export async function settle(page) {
+  const start = performance.now();
   for (let seen = -1; ; ) {
     // What cannot be fetched is the page's to say.
-    await page.evaluate(() => window.tetralodDemo.viewer?.settled().catch(() => {}));
+    await page.evaluate((patience) => window.tetralodDemo.viewer?.settled({ signal: AbortSignal.timeout(patience) }).catch(() => {}), PATIENCE);
     const [frames, step] = [await demo(page, "frames"), await demo(page, "step")];
     if (frames === seen && step?.done !== false) return;
+    assert.ok(performance.now() - start < 2 * PATIENCE, `no rest: ${frames} frames, ${frames - seen} of them just now, ${JSON.stringify(step)} ${page.complaints}`);
     seen = frames;
     await page.waitForTimeout(400);
   }
