@@ -166,3 +166,73 @@ fn distance(corners: &[DVec3; 4], p: DVec3) -> f64 {
     }
     if outside { nearest } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Bounds;
+
+    fn next(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 40) as f64 / (1_u64 << 24) as f64 * 2.0 - 1.0
+    }
+
+    /// How far a point is outside of a region, by its definition.
+    fn outside(region: &Region, p: DVec3) -> f64 {
+        match region {
+            Region::Sphere { centre, radius } => p.distance((*centre).into()) - radius,
+            Region::Box(bounds) => {
+                (0..3).map(|i| (bounds.min[i] - p[i]).max(p[i] - bounds.max[i])).fold(f64::MIN, f64::max)
+            }
+            Region::HalfSpace { normal, offset } => {
+                (DVec3::from(*normal).dot(p) - offset) / DVec3::from(*normal).length()
+            }
+            Region::Slab { normal, offset, thickness } => {
+                let normal = DVec3::from(*normal);
+                (normal.dot(p) - offset).abs() / normal.length() - 0.5 * thickness
+            }
+            _ => unreachable!("not among those that are tried"),
+        }
+    }
+
+    /// The least of the function over a fine grid of points of a tetrahedron is that of [`Shape::least`], but for half a cell.
+    #[test]
+    fn the_least_distance_from_a_region_is_that_of_its_nearest_point() {
+        let origin = DVec3::new(0.3, -0.2, 0.1);
+        let regions = [
+            Region::Sphere { centre: [0.1, 0.2, -0.1], radius: 0.4 },
+            Region::Box(Bounds { min: [-0.3, -0.1, 0.0], max: [0.2, 0.3, 0.4] }),
+            Region::HalfSpace { normal: [1.0, 2.0, -0.5], offset: -0.7 },
+            Region::Slab { normal: [0.0, 2.0, 1.0], offset: 0.3, thickness: 0.1 },
+        ];
+        const STEPS: u32 = 16;
+        let mut state = 7;
+        for round in 0..400 {
+            let corners = [0; 4].map(|_| DVec3::from([0; 3].map(|_| next(&mut state))));
+            let [a, b, c, d] = corners;
+            // As in meshes: positive.
+            let corners = if (b - a).cross(c - a).dot(d - a) > 0.0 { corners } else { [a, c, b, d] };
+            let longest = corners.iter().flat_map(|p| corners.map(|q| p.distance(q))).fold(0.0, f64::max);
+            let mut points = Vec::new();
+            for i in 0..=STEPS {
+                for j in 0..=STEPS - i {
+                    for k in 0..=STEPS - i - j {
+                        let weights =
+                            [i, j, k, STEPS - i - j - k].map(|part| f64::from(part) / f64::from(STEPS));
+                        points.push((0..4).map(|n| weights[n] * corners[n]).sum::<DVec3>());
+                    }
+                }
+            }
+            let region = &regions[round % regions.len()];
+            let twin = points.iter().map(|&p| outside(region, p)).fold(f64::INFINITY, f64::min);
+            let seen = corners.map(|p| p - origin);
+            for threshold in [-0.3, -0.05, 0.0, 0.05, 0.3] {
+                let (least, _) = Shape::new(region, origin).least(&seen, threshold);
+                // A grid sees a little more than the least.
+                let cell = longest / f64::from(STEPS);
+                assert!(least <= threshold || twin > threshold - 1e-12, "{region:?}: {least}, {twin}");
+                assert!(least > threshold || twin - cell <= threshold, "{region:?}: {least}, {twin}");
+            }
+        }
+    }
+}

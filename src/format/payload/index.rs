@@ -181,3 +181,87 @@ fn read_block(
     block.parents.reverse();
     Ok(block)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Lattice;
+    use crate::mt::FieldInfo;
+
+    fn info(kind: MtKind) -> MtInfo {
+        MtInfo {
+            kind,
+            lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 10 },
+            fields: vec![FieldInfo { bits: 12, ..FieldInfo::default() }],
+            vertices: 0,
+            tetrahedra: 0,
+            updates: 40,
+            displacement_per_error: 1.0,
+            quantization: 0.0,
+            bounds: None,
+        }
+    }
+
+    /// The index of 40 updates in blocks of 16.
+    fn index() -> Index {
+        let block = |parents: &[u32]| BlockInfo {
+            lengths: vec![100, 20],
+            bounds: [[0, 4, 8], [1024, 8, 12]],
+            errors: vec![ErrorCode(3 << 8)],
+            ranges: vec![[16, 4096]],
+            parents: parents.to_vec(),
+        };
+        Index { block_bits: 4, shared: 1 << 40, blocks: vec![block(&[]), block(&[0]), block(&[0, 1])] }
+    }
+
+    fn read(index: &Index, kind: MtKind) -> Result<Index, FormatError> {
+        let mut bytes = Vec::new();
+        index.write(&mut bytes, &info(kind));
+        Index::read(Reader::new(&bytes, 0), &info(kind), 2)
+    }
+
+    #[test]
+    fn an_index_comes_back() {
+        assert_eq!(read(&index(), MtKind::Edge), Ok(index()));
+    }
+
+    #[test]
+    fn what_no_writer_can_mean_is_refused() {
+        type Fault = (&'static str, fn(&mut Index));
+        let faults: [Fault; 7] = [
+            ("blocks of 2^3 updates", |index| index.block_bits = 3),
+            ("blocks of 2^17 updates", |index| index.block_bits = 17),
+            ("too much between index and blocks", |index| index.shared = MAX_SHARED + 1),
+            ("too few blocks", |index| drop(index.blocks.pop())),
+            ("too many blocks", |index| index.blocks.push(BlockInfo::clone(&index.blocks[2]))),
+            ("a box beyond the lattice", |index| index.blocks[1].bounds[1][2] = 1028),
+            ("levels beyond the lattice", |index| index.blocks[2].ranges[0][1] = 4112),
+        ];
+        for (what, fault) in faults {
+            let mut index = index();
+            fault(&mut index);
+            assert!(matches!(read(&index, MtKind::Edge), Err(FormatError::Corrupt { .. })), "{what}");
+        }
+        assert!(
+            matches!(read(&index(), MtKind::HalfEdge), Err(FormatError::Corrupt { .. })),
+            "half-edge MTs have no parents"
+        );
+        // The last block depends on two: these numbers are at the end.
+        let mut bytes = Vec::new();
+        index().write(&mut bytes, &info(MtKind::Edge));
+        assert!(bytes.ends_with(&[2, 0, 0]));
+        let parents: [(&str, &[u8]); 3] = [
+            ("more blocks to depend on than come before", &[3, 0, 0]),
+            ("one before the first", &[1, 2]),
+            ("one before the first, as the second", &[2, 0, 1]),
+        ];
+        for (what, parents) in parents {
+            let bytes = [&bytes[..bytes.len() - 3], parents].concat();
+            let read = Index::read(Reader::new(&bytes, 0), &info(MtKind::Edge), 2);
+            assert!(matches!(read, Err(FormatError::Corrupt { .. })), "{what}");
+        }
+        let mut free = index();
+        free.blocks.iter_mut().for_each(|block| block.parents.clear());
+        assert_eq!(read(&free, MtKind::HalfEdge), Ok(free));
+    }
+}
