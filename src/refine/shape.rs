@@ -169,13 +169,9 @@ fn distance(corners: &[DVec3; 4], p: DVec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tet_minimax::tests::next;
     use super::*;
     use crate::geom::Bounds;
-
-    fn next(state: &mut u64) -> f64 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 40) as f64 / (1_u64 << 24) as f64 * 2.0 - 1.0
-    }
 
     /// How far a point is outside of a region, by its definition.
     fn outside(region: &Region, p: DVec3) -> f64 {
@@ -195,7 +191,7 @@ mod tests {
         }
     }
 
-    /// The least of the function over a fine grid of points of a tetrahedron is that of [`Shape::least`], but for half a cell.
+    /// The least of the function over a fine grid of points of a tetrahedron is that of [`Shape::least`], but for a cell of the grid.
     #[test]
     fn the_least_distance_from_a_region_is_that_of_its_nearest_point() {
         let origin = DVec3::new(0.3, -0.2, 0.1);

@@ -132,10 +132,11 @@ fn pivot(table: &mut [[f64; 5]], goal: &mut [f64; 5], line: usize, column: usize
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn next(state: &mut u64) -> f64 {
+    /// A random number from -1 to 1.
+    pub(in crate::refine) fn next(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (*state >> 40) as f64 / (1_u64 << 24) as f64 * 2.0 - 1.0
     }

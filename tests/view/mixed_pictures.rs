@@ -124,7 +124,7 @@ const NESTED: u8 = 12;
 /// Balls around each other, so that each pixel needs two fragments for each of them: more than lists have room for at first.
 fn add_nested(mixed: &mut Mixed<'_>, renderer: &mut Renderer) {
     for i in 0..NESTED {
-        let t = f32::from(i) / 11.0;
+        let t = f32::from(i) / f32::from(NESTED - 1);
         let colouring = Colouring::Sides([[t, 0.3, 1.0 - t], [1.0 - t, 0.9 * t, 0.2]]);
         let style = Style { colouring, opacity: 0.3, lighting: Lighting::None, ..Style::default() };
         let (positions, indices) = ball(0.5 + 0.02 * f64::from(i), 10);
