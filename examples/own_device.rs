@@ -8,15 +8,15 @@ use std::error::Error;
 use std::fs::{File, read};
 use std::io::Write;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Camera;
-use tetralod::gpu::{Context, Renderer, wait, wgpu};
 use tetralod::mesh::{Field, Grid, TetMesh};
 use tetralod::mt::MtKind;
 use tetralod::refine::{Need, Request};
-use tetralod::scene::{IsosurfaceState, Scene, SceneState, VolumeState};
 use tetralod::session::Session;
+use tetralod_build::{BuildConfig, build};
+use tetralod_render::gpu::{Context, Renderer, wait, wgpu};
+use tetralod_render::scene::{IsosurfaceState, Scene, SceneState, VolumeState};
 
 const SIZE: [u32; 2] = [640, 480];
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

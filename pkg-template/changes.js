@@ -35,31 +35,11 @@ export function arrayBits(names) {
  * @param {ArrayBuffer} buffer
  * @param {Uint32Array} places address and length of each
  * @param {number} bits
- * @param {Float32ArrayConstructor | Float64ArrayConstructor} [Floats] of positions and values
  */
-export function arraysIn(buffer, places, bits, Floats = Float32Array) {
-  const kinds = [Floats, Floats, Uint32Array, Uint32Array];
+export function arraysIn(buffer, places, bits) {
+  const kinds = [Float32Array, Float32Array, Uint32Array, Uint32Array];
   const entries = ARRAYS.map(([name], at) => [name, new kinds[at](buffer, places[2 * at], places[2 * at + 1])]);
   return Object.fromEntries(entries.filter((_, at) => (bits >> at) & 1));
-}
-
-/**
- * Copies what has changed in a mesh from the memory of one wasm module to that of another.
- *
- * @param {[ArrayBuffer, Uint32Array]} from a memory, and address and length of each array
- * @param {[ArrayBuffer, Uint32Array]} to the same of the copy, which has room for as much
- * @param {{ vertices: Uint32Array, tets: Uint32Array }} changed start and end of each range
- */
-export function copyChanged([from, places], [to, copies], changed) {
-  // Modules have the mesh in double precision.
-  const [source, target] = [arraysIn(from, places, ALL, Float64Array), arraysIn(to, copies, ALL, Float64Array)];
-  for (const [name, kind, size] of ARRAYS) {
-    const ranges = changed[kind];
-    for (let i = 0; i < ranges.length; i += 2) {
-      const start = size * ranges[i];
-      target[name].set(source[name].subarray(start, size * ranges[i + 1]), start);
-    }
-  }
 }
 
 /** A mesh of no tetrahedra, for `applyChanges` to begin with. */

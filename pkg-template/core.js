@@ -1,57 +1,31 @@
 /** The wasm core behind the methods that `MultiTessellation` calls: in a worker, or in the caller's own thread. */
 
 import initCore, { CoreSession, RangeLoader } from "./tetralod_core.js";
-import initAllKinds, { CoreSession as AllKindsSession, RangeLoader as AllKindsLoader } from "./tetralod_all_kinds.js";
-import initTools, { MeshTools } from "./tetralod_tools.js";
-import { arraysIn, copyChanged } from "./changes.js";
+import { arraysIn } from "./changes.js";
 import { TetralodError, flattenError, reviveError } from "./errors.js";
 import { received } from "./options.js";
-import { allKindsWasm, coreWasm, toolsWasm } from "./files.js";
+import { coreWasm } from "./files.js";
 import { Parts } from "./parts.js";
-import { FirstResponse, SharedRanges } from "./ranges.js";
+import { SharedRanges } from "./ranges.js";
 import { portEndpoint, serve } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
 import { withFields } from "./stored.js";
-import { copyToolMethods, limitOf } from "./tools.js";
+import { limitOf, meshToolMethods } from "./tools.js";
 import { VERSION } from "./version.js";
 
-/**
- * A wasm module that is compiled once per thread.
- *
- * @template T
- * @param {(options: object) => Promise<{ memory: WebAssembly.Memory }>} init
- * @param {T} classes
- * @param {() => any} place the address of the package's own, or its bytes
- * @param {string} entry
- * @param {string} [option] what else may say where it is
- */
-function lazily(init, classes, place, entry, option) {
-  let loading;
-  const load = async (wasm) => {
-    const { memory } = await init({ module_or_path: await wasmOf(wasm) });
-    return { ...classes, memory };
-  };
-  /** Without `wasm`, its address or its bytes, the one of the package. */
-  return (wasm = undefined) => {
-    loading ??= load(wasm ?? place()).catch((error) => {
-      loading = undefined;
-      throw wasmError(error, entry, option);
-    });
-    return loading;
-  };
+/** @type {Promise<{ memory: WebAssembly.Memory }> | undefined} */
+let loading;
+
+/** The wasm module, which is compiled once per thread; without `wasm`, its address or its bytes, the one of the package. */
+export function loadCore(wasm = undefined) {
+  loading ??= compiled(wasm ?? coreWasm()).catch((error) => {
+    loading = undefined;
+    throw wasmError(error, "tetralod/core.wasm");
+  });
+  return loading;
 }
 
-/** The module that is enough for half-edge MTs. */
-export const loadCore = lazily(initCore, { Session: CoreSession, Loader: RangeLoader }, coreWasm, "tetralod/core.wasm");
-
-/** The one for MTs of the other kinds: a page that opens none does not download it. */
-const loadAllKinds = lazily(initAllKinds, { Session: AllKindsSession, Loader: AllKindsLoader }, allKindsWasm, "tetralod/all-kinds.wasm");
-
-/** Where the caller says that the one with the tools is. */
-let toolsPlace;
-
-/** The one with the tools for meshes: a page that only wants the mesh does not download it. */
-const loadTools = lazily(initTools, { Tools: MeshTools }, () => toolsPlace ?? toolsWasm(), "tetralod/tools.wasm", "toolsUrl");
+const compiled = async (wasm) => initCore({ module_or_path: await wasmOf(wasm) });
 
 /** The methods that wait for bytes, beside which others are answered. */
 export const WAITING = ["openParts", "reach", "settled", "arrived"];
@@ -66,16 +40,10 @@ const SUMS = ["refined", "coarsened", "forced", "judged", "milliseconds"];
 
 /** The methods of one session, for `serve` or `Local`; `emit` sends events, `shared` are the ranges of all sessions of the file. */
 export function coreMethods(emit, shared = new SharedRanges()) {
-  /** The wasm module: first the one for half-edge MTs, which says what is of another kind. */
-  let load = loadCore;
-  /** @type {Awaited<ReturnType<typeof loadCore>>} */
-  let wasm;
+  /** @type {CoreSession | undefined} */
   let session;
-  /** What works on a copy of the mesh. @type {MeshTools | undefined} */
-  let tools;
-  /** What has come of a stream until its base mesh is there, and the fields that are wanted of it. @type {Uint8Array[] | undefined} */
-  let head;
-  let wanted;
+  /** That of the wasm module. @type {WebAssembly.Memory} */
+  let memory;
   /** The last request, and the one before it, which holds again if that is given up. @type {Record<string, any>} */
   let request = NOTHING;
   let before = NOTHING;
@@ -131,84 +99,30 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     if (!zeroCopy) return { ...mesh, stats, more };
     // Last: where the memory grows, views of it end.
     const places = session.places();
-    return { ...mesh, ...arraysIn(wasm.memory.buffer, places, arrays), stats, more };
-  };
-  /** Calls `use` with the tools and the mesh as it is now: what has changed since the last time is copied. */
-  const withTools = async (use) => {
-    const { Tools, memory } = await loadTools();
-    const changed = session.copied(!tools);
-    const made = tools ?? new Tools();
-    // If this fails, the next call begins with another copy.
-    tools = undefined;
-    made.setStored(session.stored());
-    const places = session.sources();
-    const copies = made.change(places[1] / 3, places[5] / 4, changed.vertices, changed.tets);
-    copyChanged([wasm.memory.buffer, places], [memory.buffer, copies], changed);
-    tools = made;
-    return use(tools);
+    return { ...mesh, ...arraysIn(memory.buffer, places, arrays), stats, more };
   };
   const close = (reason) => {
     parts?.close(reason);
     session?.free();
-    tools?.free();
-    [session, parts, tools] = [undefined, undefined, undefined];
-  };
-  /** Begins with the file again, with the other module, where this one has no MTs of its kind. */
-  const orWithAllKinds = async (first, again) => {
-    try {
-      return await first();
-    } catch (error) {
-      if (error?.code !== "kind" || load === loadAllKinds) throw error;
-      close();
-      load = loadAllKinds;
-      return again();
-    }
-  };
-  const start = async () => {
-    wasm = await load();
-    session = new wasm.Session(wanted);
-  };
-  const feedAll = async () => {
-    await start();
-    let progress;
-    for (const bytes of head) progress = session.feed(bytes);
-    return progress;
-  };
-  const openParts = async (url, { fields, memory, ...options }) => {
-    wasm = await load();
-    const make = (loader) => (session = wasm.Session.inParts(fields, memory, loader));
-    parts = new Parts(wasm.Loader, make, url, { ...options, shared }, (progress) => emit("progress", progress), (error) => emit("error", flattenError(error)));
-    if (await parts.begin()) return { info: session.info(), progress: parts.progress };
-    return close();
+    [session, parts] = [undefined, undefined];
   };
   return {
-    async load(wasm, tools) {
-      toolsPlace = tools ?? toolsPlace;
+    async load(wasm) {
       await loadCore(wasm);
       return { name: "core", version: VERSION };
     },
-    start(fields) {
-      [head, wanted] = [[], fields];
-      return start();
+    async start(fields) {
+      ({ memory } = await loadCore());
+      session = new CoreSession(fields);
     },
-    async feed(bytes) {
-      head?.push(bytes);
-      const progress = await orWithAllKinds(() => session.feed(bytes), feedAll);
-      if (progress.ready) head = undefined;
-      return progress;
-    },
+    feed: (bytes) => session.feed(bytes),
     /** Opens a file in parts; resolves to nothing without ranges of the server, else when the base mesh has arrived. */
-    async openParts(url, options) {
-      // What has come for one module is not fetched again for the other.
-      const first = new FirstResponse();
-      const open = () => openParts(url, { ...options, first });
-      const again = () => {
-        first.begin();
-        return open();
-      };
-      const opened = await orWithAllKinds(open, again);
-      first.take();
-      return opened;
+    async openParts(url, { fields, memory: bytes, ...options }) {
+      ({ memory } = await loadCore());
+      const make = (loader) => (session = CoreSession.inParts(fields, bytes, loader));
+      parts = new Parts(RangeLoader, make, url, { ...options, shared }, (progress) => emit("progress", progress), (error) => emit("error", flattenError(error)));
+      if (await parts.begin()) return { info: session.info(), progress: parts.progress };
+      return close();
     },
     finish: () => session.finish(),
     info: () => session.info(),
@@ -246,7 +160,7 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     /** Ends the fetching; the mesh stays usable. */
     halt: () => parts?.close(new TetralodError("freed", "the download was ended")),
     setField: (name) => session.setField(name),
-    ...copyToolMethods(() => session, withTools),
+    ...meshToolMethods(() => session),
     /** Begins another session over the same bytes, which is called through `port`. */
     view(port) {
       shared.count(1);

@@ -3,14 +3,8 @@
  * URLs lead. `tetralod/inline` has another module in place of this one (`xtask/js/inline-files.mjs`).
  */
 
-/** The wasm module of the core, for half-edge MTs. @returns {URL | Promise<Uint8Array>} */
+/** The wasm module of the core. @returns {URL | Promise<Uint8Array>} */
 export const coreWasm = () => new URL("./tetralod_core_bg.wasm", import.meta.url);
-
-/** The same with MTs of all kinds. @returns {URL | Promise<Uint8Array>} */
-export const allKindsWasm = () => new URL("./tetralod_all_kinds_bg.wasm", import.meta.url);
-
-/** The one with the tools for meshes: surfaces, probes, streamlines. @returns {URL | Promise<Uint8Array>} */
-export const toolsWasm = () => new URL("./tetralod_tools_bg.wasm", import.meta.url);
 
 /** The worker of the core in a page, from the page's own origin. @returns {Worker} */
 export const startCore = () => new Worker(new URL("./worker.js", import.meta.url), { type: "module" });

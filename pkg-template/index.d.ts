@@ -153,23 +153,12 @@ export interface OpenOptions extends ReadOptions {
    */
   workerTimeoutMs?: number;
   /**
-   * The address of the wasm file, `tetralod/core.wasm` or `tetralod/all-kinds.wasm`. A relative address is relative to the page.
-   * Default: the file beside the worker's.
-   *
-   * `tetralod/core.wasm` is enough for half-edge MTs, the kind that `tetralod build` makes. When a file of another kind is opened,
-   * `tetralod/all-kinds.wasm` is loaded besides, from beside the worker; name it here to load only that one.
+   * The address of the wasm file, `tetralod/core.wasm`. A relative address is relative to the page. Default: the file beside the
+   * worker's.
    *
    * @throws {TetralodError} `wasm` if it cannot be loaded or compiled
    */
   wasmUrl?: string | URL;
-  /**
-   * The address of the wasm file with the tools for meshes, `tetralod/tools.wasm`. A relative address is relative to the page.
-   * Default: the file beside the worker's. It is loaded by the first call of `isosurface`, `slice`, `surface`, `probe`, `line`,
-   * `streamlines` or `stats`, once for all volumes of a thread.
-   *
-   * @throws {TetralodError} `wasm` from these calls if it cannot be loaded or compiled
-   */
-  toolsUrl?: string | URL;
 }
 
 /** The work of a refinement, or of a step of one, and the quality of the mesh. */

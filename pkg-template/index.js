@@ -4,7 +4,7 @@
 
 import { applyChanges, arrayBits, emptyMesh } from "./changes.js";
 import { Local, REPLACED } from "./core.js";
-import { coreRemedy, coreScript, coreWasm, startCore, toolsWasm } from "./files.js";
+import { coreRemedy, coreScript, coreWasm, startCore } from "./files.js";
 import { TetralodError, reviveError } from "./errors.js";
 import { openOptions, sendable } from "./options.js";
 import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
@@ -14,7 +14,7 @@ import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
 export { TetralodError, absolute, applyChanges, emptyMesh };
 
-const OPEN_OPTIONS = ["signal", "onProgress", ...PLACES, "toolsUrl"];
+const OPEN_OPTIONS = ["signal", "onProgress", ...PLACES];
 const NO_RETRY = "only a file that is fetched in parts can be continued: open it again";
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "arrays", "signal"];
 const NO_VIEW = "a stream is read only once; for views, open a URL, a Blob or bytes in memory";
@@ -46,17 +46,16 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
   #asked = Promise.resolve();
 
   static async open(source, options = {}) {
-    const { signal, onProgress = () => {}, worker = true, workerUrl, workerTimeoutMs, wasmUrl, toolsUrl, ...how } = options;
+    const { signal, onProgress = () => {}, worker = true, workerUrl, workerTimeoutMs, wasmUrl, ...how } = options;
     const fetching = openOptions(how, OPEN_OPTIONS);
-    const wasm = wasmUrl === undefined ? await embedded(coreWasm) : absoluteUrl("wasmUrl", wasmUrl).href;
-    const tools = toolsUrl === undefined ? await embedded(toolsWasm) : absoluteUrl("toolsUrl", toolsUrl).href;
+    const wasm = wasmUrl === undefined ? await embedded() : absoluteUrl("wasmUrl", wasmUrl).href;
     signal?.throwIfAborted();
     if (!worker && workerUrl !== undefined) throw new TetralodError("bad-option", "option `workerUrl`: goes with `worker: true` only");
     let mt;
     const onEvent = (name, data) => mt.#heard(name, data);
     const core = worker ? startWorker(CORE, { worker, workerUrl, workerTimeoutMs }, onEvent) : new Local(onEvent);
     mt = new MultiTessellation(core, Boolean(worker), onProgress);
-    return mt.#opened(source, signal, fetching, loadWasm(core, CORE, wasm, tools));
+    return mt.#opened(source, signal, fetching, loadWasm(core, CORE, wasm));
   }
 
   /** @private use `MultiTessellation.open` */
@@ -311,8 +310,8 @@ const CORE = {
   remedy: coreRemedy,
 };
 
-/** The bytes of a wasm module, where they are in this one; elsewhere the worker finds its file. */
-async function embedded(place) {
-  const wasm = place();
+/** The bytes of the wasm module, where they are in this one; elsewhere the worker finds its file. */
+async function embedded() {
+  const wasm = coreWasm();
   return wasm instanceof URL ? undefined : wasm;
 }

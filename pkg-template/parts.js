@@ -90,8 +90,7 @@ export class Parts {
       return true;
     } catch (error) {
       const known = reviveError(error);
-      // A module with all kinds of MT takes the same data.
-      if (known.code !== "kind") this.#ranges.forget();
+      this.#ranges.forget();
       this.#fail(new TetralodError(known.code, `${this.#name}: ${known.message}`, { cause: error }));
       return false;
     }

@@ -27,7 +27,6 @@ const LATE = 100;
  * @property {typeof fetch} [fetch] used in place of the global one, for instance to sign requests
  * @property {HeadersInit} [headers] go along with each request to the origin of the address; it must allow them
  * @property {RequestCredentials} [credentials]
- * @property {FirstResponse} [first] keeps the first response, or has that of a session before
  * @property {SharedRanges} [shared] ranges that several sessions of one file have, in place of `cache`
  * @property {string} [cache] name of a cache (Cache Storage) in which ranges are kept for the next time, where there is one
  * @property {number} [maxRequests] at a time; 6
@@ -250,10 +249,8 @@ export class Ranges {
       return !this.#closed && this.#open.get(id) === controller;
     };
     const asked = this.#ledTo;
-    const { first } = this.#options;
     try {
-      if (first?.answers(start, end)) await this.#repeat(id, first.take(), tell);
-      else await this.#receive(id, asked, [start, end], controller.signal, tell);
+      await this.#receive(id, asked, [start, end], controller.signal, tell);
     } catch (error) {
       const blocked = !controller.signal.aborted && (await this.#isBlocked(error, asked, controller.signal));
       const detail = String(error?.cause?.message || error?.cause?.code || error?.message || error);
@@ -273,21 +270,9 @@ export class Ranges {
     }
     if (response.ok && response.url && (this.#isOwn(response.url) || this.#asksOthers)) this.#ledTo = response.url;
     const fields = FIELDS.map((name) => response.headers.get(name));
-    const pieces = this.#options.first?.record(start, end, response.status, fields);
     if (!tell((now) => this.#loader.head(id, now, response.status, fields))) return;
-    await this.#body(response, (bytes) => {
-      pieces?.push(bytes);
-      return tell((now) => this.#loader.data(id, now, bytes));
-    });
+    await this.#body(response, (bytes) => tell((now) => this.#loader.data(id, now, bytes)));
     tell((now) => this.#loader.end(id, now));
-  }
-
-  /** As `#receive`, from what a session before has received. */
-  async #repeat(id, { status, fields, pieces }, tell) {
-    // Answers come after the call that asks.
-    await null;
-    if (!tell((now) => this.#loader.head(id, now, status, fields))) return;
-    if (pieces.every((bytes) => tell((now) => this.#loader.data(id, now, bytes)))) tell((now) => this.#loader.end(id, now));
   }
 
   /** Whether an address is of the same origin as the given one. */
@@ -327,36 +312,6 @@ export class Ranges {
     if (this.#options.fetch) return false;
     const probe = fetch(url, { mode: "no-cors", method: "HEAD", cache: "no-store", signal });
     return probe.then(() => true, () => false);
-  }
-}
-
-/** What came for the first request of a session, for one that begins again with the file. */
-export class FirstResponse {
-  #request;
-  #response;
-  #again = false;
-
-  /** Keeps the first one that comes; returns where to put its bytes, or nothing for others. */
-  record(start, end, status, fields) {
-    if (this.#request) return undefined;
-    [this.#request, this.#response] = [[start, end], { status, fields, pieces: [] }];
-    return this.#response.pieces;
-  }
-
-  /** From now on it answers the same request, once. */
-  begin() {
-    this.#again = true;
-  }
-
-  answers(start, end) {
-    return this.#again && Boolean(this.#response) && this.#request[0] === start && this.#request[1] === end;
-  }
-
-  /** Hands it out, and keeps nothing. */
-  take() {
-    const response = this.#response;
-    this.#response = undefined;
-    return response;
   }
 }
 

@@ -123,11 +123,10 @@ function notStarted(kind, place, error) {
  * @param {{ call: (method: string, args: any[]) => Promise<any> }} core
  * @param {Kind} kind
  * @param {any} wasm its address or its bytes; without it the one beside the worker
- * @param {any} [more] for the core, the address or the bytes of the module with the tools; for viewers, the URL of a file that is
- *   opened next, whose first bytes are fetched meanwhile
+ * @param {string} [ahead] for viewers, the URL of a file that is opened next, whose first bytes are fetched meanwhile
  */
-export async function loadWasm(core, kind, wasm, more = undefined) {
-  const found = await core.call("load", [wasm, more]);
+export async function loadWasm(core, kind, wasm, ahead = undefined) {
+  const found = await core.call("load", [wasm, ahead]);
   if (found?.name === kind.name && found.version === VERSION) return;
   const other = found ? `tetralod ${found.version}, ${found.name}` : "something else";
   const wanted = `"${kind.entry}" of tetralod ${VERSION} is needed`;
@@ -156,11 +155,11 @@ export async function wasmOf(source) {
   return response;
 }
 
-/** Why no wasm module could be loaded, and what to do; `option` says where it is. */
-export function wasmError(error, entry, option = "wasmUrl") {
+/** Why no wasm module could be loaded, and what to do. */
+export function wasmError(error, entry) {
   const isPolicy = /unsafe-eval|Content.Security.Policy/i.test(String(error?.message));
   const remedy = isPolicy
     ? "allow 'wasm-unsafe-eval' in script-src of the Content-Security-Policy of the page and of the worker's file"
-    : `set \`${option}\` to the address of "${entry}" as your server or bundler gives it`;
+    : `set \`wasmUrl\` to the address of "${entry}" as your server or bundler gives it`;
   return new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}; ${remedy}`, { cause: error });
 }

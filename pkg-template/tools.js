@@ -108,31 +108,6 @@ export const meshToolMethods = (session) => ({
 });
 
 /**
- * The same where the tools are in another module than the session, on a copy of its mesh.
- *
- * @param {() => any} session
- * @param {(use: (tools: any) => any) => Promise<any>} tools calls `use` with the mesh as it is then
- */
-export const copyToolMethods = (session, tools) => {
-  const values = (field) => session().values(field);
-  const surface = (wanted, make) => tools((on) => surfaceOf(session(), wanted, (fields) => make(on, fields.map(values))));
-  return {
-    isosurface: (at, smooth, wanted) => surface(wanted, (on, fields) => on.isosurfaces(at, smooth, fields)),
-    slice: (normal, offset, wanted) => surface(wanted, (on, fields) => on.slice(normal, offset, fields)),
-    surface: (wanted) => surface(wanted, (on, fields) => on.surface(fields)),
-    probe: (points) => tools((on) => on.probe(points)),
-    line: (from, to) => tools((on) => on.line(from, to)),
-    streamlines: (fields, ...how) => tools((on) => on.streamlines(...fields.map(values), ...how)),
-    stats: (bins, low, high, fractions) =>
-      tools((on) => {
-        const [min, max] = session().range();
-        return on.stats(bins, Number.isNaN(low) ? min : low, Number.isNaN(high) ? max : high, fractions);
-      }),
-    hash: () => session().hash(),
-  };
-};
-
-/**
  * What keeps a mesh from being finer.
  *
  * @param {{ done: boolean, satisfied: boolean, missing: boolean }} stats

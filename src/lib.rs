@@ -7,17 +7,16 @@
 //! Multi-Tessellations: an Overview* (2003); `[§n]` in these docs points into that paper.
 //!
 //! # From a mesh to a surface
-#![cfg_attr(feature = "build", doc = "```")]
-#![cfg_attr(not(feature = "build"), doc = "```ignore")]
+//! ```
 //! use std::ops::ControlFlow;
-//! use tetralod::builder::{BuildConfig, build};
+//! use tetralod_build::{BuildConfig, build};
 //! use tetralod::format::{EncodeOptions, encode};
 //! use tetralod::refine::Request;
 //! use tetralod::session::Session;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A mesh: generated here; `tetralod::io::read` reads one from a file. Meshes in files often need repair.
-//! let mesh = tetralod::generate::bucky(17)?;
+//! let mesh = tetralod_io::generate::bucky(17)?;
 //! let (mesh, repaired) = tetralod::mesh::repair(mesh)?;
 //! assert!(repaired.is_empty());
 //!
@@ -50,12 +49,11 @@
 //! # Features
 //!
 //! The core (decoder, refinement, isosurfaces on the CPU) is always there and needs no I/O, no GPU and no JavaScript:
-//! `default-features = false` is enough for a program that shows half-edge MTs, which the builders make by default. Features add the rest:
+//! `default-features = false` is enough for a program that shows MTs. Features add the rest:
 //!
 //! | feature | adds | for |
 //! |---|---|---|
 //! | `build` (default) | modules `io`, `generate`, `builder`, `measure`, `verify` | making MTs, natively or in wasm |
-//! | `all-kinds` (default) | MTs of the other kinds; without it, decoders refuse their files ([`FormatError::Kind`](format::FormatError::Kind)) and their constructors panic | files of any kind |
 //! | `http` | `stream::HttpSource` | MT files on servers, in native programs |
 //! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
 //! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |
@@ -146,37 +144,24 @@
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
 
-pub mod bench;
-#[cfg(feature = "build")]
-pub mod builder;
 pub mod client;
+mod coded;
 pub mod format;
-#[cfg(feature = "build")]
-pub mod generate;
 pub mod geom;
-#[cfg(feature = "gpu")]
-pub mod gpu;
-#[cfg(feature = "build")]
-pub mod io;
-#[cfg(feature = "build")]
-pub mod measure;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
 pub mod remote;
-#[cfg(feature = "gpu")]
-pub mod scene;
 pub mod session;
 pub mod stream;
-mod threads;
-#[cfg(feature = "build")]
-pub mod verify;
+#[doc(hidden)]
+pub mod threads;
 pub mod view;
-#[cfg(feature = "web")]
-pub mod web;
+
+pub use coded::Coded;
 
 /// The Rust code of README.md and of the pages in `docs/`, as tests.
-#[cfg(all(doctest, feature = "build"))]
+#[cfg(doctest)]
 mod pages {
     #[doc = include_str!("../README.md")]
     struct Readme;

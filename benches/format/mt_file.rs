@@ -2,10 +2,10 @@
 
 use super::Result;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, Purpose, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::MtKind;
+use tetralod_build::{BuildConfig, Purpose, build};
 
 /// The MT file of a mesh.
 pub fn mt_file(mesh: &TetMesh, kind: MtKind, purpose: Purpose) -> Result<Vec<u8>> {

@@ -6,13 +6,13 @@ use super::sets::Set;
 use super::surfaces::{Interpolant, Mesh, Surface};
 use std::io::Cursor;
 use std::time::Duration;
-use tetralod::builder::Purpose;
 use tetralod::client::{Client, ClientOptions};
 use tetralod::geom::Bounds;
 use tetralod::mt::MtKind;
 use tetralod::refine::{Need, RefineStats, Request};
 use tetralod::session::Session;
 use tetralod::stream::FileSource;
+use tetralod_build::Purpose;
 
 /// Fewest tetrahedra of a set whose first picture is measured.
 const LARGE: usize = 150_000;

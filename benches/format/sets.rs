@@ -4,11 +4,12 @@ use super::Result;
 use super::mt_file::mt_file;
 use std::fs;
 use std::path::Path;
-use tetralod::builder::Purpose;
-use tetralod::io::{CellData, ReadOptions};
 use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::MtKind;
-use tetralod::{generate, io};
+use tetralod_build::Purpose;
+use tetralod_io as io;
+use tetralod_io::generate;
+use tetralod_io::{CellData, ReadOptions};
 
 pub struct Set {
     pub name: String,

@@ -6,10 +6,10 @@ use super::sets::Set;
 use std::io::{Read, Write};
 use std::process::{Command, Stdio};
 use std::time::Instant;
-use tetralod::builder::Purpose;
 use tetralod::format::{Decoder, breakdown};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{MtKind, MultiTessellation};
+use tetralod_build::Purpose;
 
 /// Most points of a set of which a vertex-based MT is built, too.
 const LARGE: usize = 100_000;

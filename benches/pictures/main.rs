@@ -10,17 +10,17 @@ mod mt_file;
 use mt_file::mt_file;
 use std::error::Error;
 use std::time::Instant;
-use tetralod::builder::Purpose;
-use tetralod::generate;
 use tetralod::geom::{Bounds, Camera};
-use tetralod::gpu::{Renderer, wait};
 use tetralod::mt::MtKind;
 use tetralod::refine::Request;
-use tetralod::scene::{
+use tetralod::session::Session;
+use tetralod_build::Purpose;
+use tetralod_io::generate;
+use tetralod_render::gpu::{Renderer, wait};
+use tetralod_render::scene::{
     ArrowState, BoundaryState, CellKind, CellState, IsosurfaceState, PlaneState, Scene, SceneState,
     SliceState, StreamlineState, VolumeState,
 };
-use tetralod::session::Session;
 
 /// Whatever goes wrong: this is a tool, it says so and ends.
 pub type Result<T> = std::result::Result<T, Box<dyn Error>>;

@@ -8,8 +8,8 @@ use std::error::Error;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
-use tetralod::io::write_vtu;
 use tetralod::mesh::TetMesh;
+use tetralod_io::write_vtu;
 
 /// Whatever goes wrong: this is a tool, it says so and ends.
 pub type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -48,7 +48,7 @@ fn compare(reference: &Path, meshes: &[&str]) -> Result<()> {
 }
 
 fn read(path: &Path) -> Result<TetMesh> {
-    let mesh = tetralod::io::read(path)?;
+    let mesh = tetralod_io::read(path)?;
     match mesh.fields.is_empty() || mesh.tets.is_empty() {
         true => Err(format!("{}: there is no field, or there are no tetrahedra", path.display()).into()),
         false => Ok(mesh),

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
-use tetralod::bench;
+use tetralod_bench as bench;
 
 /// Times decoding, refinement, coarsening and isosurfaces of an MT file on one thread.
 #[derive(clap::Args)]
@@ -132,7 +132,7 @@ fn triangulate(points: &[[i32; 3]]) -> Result<Tets> {
     let begin = Instant::now();
     while begin.elapsed().as_secs_f64() < TIME {
         let start = Instant::now();
-        let tets = tetralod::builder::delaunay(points)?;
+        let tets = tetralod_build::delaunay(points)?;
         fastest = fastest.max(tets.len() as f64 / start.elapsed().as_secs_f64());
     }
     Ok(Tets { tets_per_second: fastest })

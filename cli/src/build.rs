@@ -15,15 +15,15 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetralod::builder::parts::PartsError;
-use tetralod::builder::{
+use tetralod::format::{EncodeOptions, encode_to};
+use tetralod::mesh::{Field, GeometryField, RepairLevel, RepairReport, TetMesh};
+use tetralod::mt::MtKind;
+use tetralod_build::parts::PartsError;
+use tetralod_build::{
     BuildConfig, BuildCriterion, BuildError, BuildProgress, BuildResult, BuildSummary, Construction,
     ConstructionChoice, FieldPrecision, Method, OnProgress, Purpose, Remedy, memory_needed,
 };
-use tetralod::format::{EncodeOptions, encode_to};
-use tetralod::io::{CellData, FieldSelection, PieceCounts, Pieces, ReadOptions};
-use tetralod::mesh::{Field, GeometryField, RepairLevel, RepairReport, TetMesh};
-use tetralod::mt::MtKind;
+use tetralod_io::{CellData, FieldSelection, PieceCounts, Pieces, ReadOptions};
 
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
 #[derive(clap::Args)]
@@ -477,7 +477,7 @@ impl BuildOptions {
         if needs_whole || files::ending(path) != "pvtu" {
             return Ok(None);
         }
-        let steps = tetralod::io::steps(path)?;
+        let steps = tetralod_io::steps(path)?;
         let [step] = &steps[..] else { return Ok(None) };
         if self.step.is_some_and(|step| step != 0) {
             return Ok(None);
@@ -625,9 +625,8 @@ fn construction(choice: &ConstructionChoice) -> Result<Construction, String> {
 }
 
 fn build(arguments: &Arguments, config: &BuildConfig, mesh: TetMesh) -> Result<BuildResult> {
-    let result = with_progress(&arguments.verbosity, |progress| {
-        tetralod::builder::build_owned(mesh, config, progress)
-    })?;
+    let result =
+        with_progress(&arguments.verbosity, |progress| tetralod_build::build_owned(mesh, config, progress))?;
     result.map_err(failed).with_context(|| arguments.options.name())
 }
 

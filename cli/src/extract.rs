@@ -5,11 +5,11 @@ use super::{files, input, npz, output};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use tetralod::measure::{Fit, Part, Promise, Reference, deviation, fit};
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo};
 use tetralod::refine;
 use tetralod::session::Session;
+use tetralod_build::measure::{Fit, Part, Promise, Reference, deviation, fit};
 
 /// Takes the mesh out of an MT file that is as coarse as a request allows.
 #[derive(clap::Args)]
@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if is_npz {
         npz::write_mesh(&mesh, &arguments.output)?;
     } else {
-        files::write_file(&arguments.output, |out| Ok(tetralod::io::write_vtu(&mesh, out)?))?;
+        files::write_file(&arguments.output, |out| Ok(tetralod_io::write_vtu(&mesh, out)?))?;
     }
     let report = Report {
         measured_error: measured.as_ref().filter(|_| fitted.is_none()).map(|measured| measured.error),

@@ -7,15 +7,14 @@ use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use tetralod::builder::{Construction, Method};
 use tetralod::client::{Client, ClientOptions};
 use tetralod::mesh::RepairLevel;
 use tetralod::mt::{Mt, MtInfo};
 use tetralod::session::Session;
 use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, WantedRange};
-#[cfg(feature = "http")]
 use tetralod::stream::{HttpOptions, HttpSource};
-use tetralod::verify::Reference;
+use tetralod_build::verify::Reference;
+use tetralod_build::{Construction, Method};
 
 /// Bytes that are read at a time.
 const CHUNK: u64 = 1 << 20;
@@ -301,13 +300,8 @@ impl RangeSource for Bytes {
 impl Bytes {
     /// Of a path, or of an address that begins with `http://` or `https://`.
     fn of(path: &Path) -> Result<Self> {
-        #[cfg(feature = "http")]
         if let Some(url) = url(path) {
             return Ok(Self(Box::new(HttpSource::new(url, HttpOptions::default()))));
-        }
-        #[cfg(not(feature = "http"))]
-        if url(path).is_some() {
-            bail!("this command was compiled without the feature `http`: it reads files, not addresses");
         }
         if let Some(scheme) = scheme(path) {
             bail!(

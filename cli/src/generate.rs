@@ -4,9 +4,9 @@ use super::{files, refuse_usage};
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::{Path, PathBuf};
-use tetralod::generate::{Options, Orbital, VOLUMES, Volume, volume};
-use tetralod::io;
 use tetralod::mesh::LayeredGrid;
+use tetralod_io as io;
+use tetralod_io::generate::{Options, Orbital, VOLUMES, Volume, volume};
 
 /// The volumes that have something to choose.
 const HYDROGEN: &str = "hydrogen";

@@ -5,10 +5,10 @@ use super::{machine, output};
 use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use tetralod::io;
-use tetralod::io::{CellData, FieldSelection, MemoryLimit, ReadOptions, ReadReason, Step};
 use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, repair_at};
-use tetralod::verify::Reference;
+use tetralod_build::verify::Reference;
+use tetralod_io as io;
+use tetralod_io::{CellData, FieldSelection, MemoryLimit, ReadOptions, ReadReason, Step};
 
 /// Reads the time steps in `paths`, each a mesh or a list of such, as one mesh, and mends it at this level. Points
 /// without any cell are as they are.

@@ -5,8 +5,8 @@ use super::query::Query;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
-use tetralod::io::PolyData;
 use tetralod::view::is_closed;
+use tetralod_io::PolyData;
 
 /// Writes isosurfaces: where the field has the values given with --iso.
 ///

@@ -6,9 +6,9 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;
-use tetralod::builder::BuildResult;
-use tetralod::builder::parts::Node;
 use tetralod::format::{EncodeOptions, encode_to};
+use tetralod_build::BuildResult;
+use tetralod_build::parts::Node;
 
 /// Joins parts that `tetralod build --part` has built: with --node eight of one level to one of the next, with -o all that has been
 /// built to one MT file.

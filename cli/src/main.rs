@@ -24,7 +24,6 @@ mod parts;
 mod poly;
 mod probe;
 mod query;
-#[cfg(feature = "render")]
 mod render;
 mod repair;
 mod restrictions;
@@ -62,7 +61,6 @@ enum Command {
     Probe(Box<probe::Arguments>),
     Streamlines(Box<streamlines::Arguments>),
     Stats(Box<stats::Arguments>),
-    #[cfg(feature = "render")]
     Render(Box<render::Arguments>),
     Verify(verify::Arguments),
     Bench(bench::Arguments),
@@ -125,7 +123,6 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Probe(arguments) => probe::run(&arguments)?,
         Command::Streamlines(arguments) => streamlines::run(&arguments)?,
         Command::Stats(arguments) => stats::run(&arguments)?,
-        #[cfg(feature = "render")]
         Command::Render(arguments) => render::run(&arguments)?,
         Command::Serve(arguments) => serve::run(&arguments)?,
     }

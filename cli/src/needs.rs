@@ -167,7 +167,6 @@ impl Group {
 
     /// The points of the first transfer function and its unit length, as a part of the model's diagonal, if
     /// there is one and it is of the field that is shown.
-    #[cfg(feature = "render")]
     pub fn shown(&self, field: &str) -> Result<Option<(Vec<[f64; 5]>, f64)>> {
         let Some(path) = self.transfers.first() else { return Ok(None) };
         let file: TransferFile = read_json(path)?;

@@ -5,8 +5,8 @@ use super::files;
 use anyhow::Result;
 use std::io::{BufWriter, Seek, Write};
 use std::path::Path;
-use tetralod::io::{PolyData, point_arrays};
 use tetralod::mesh::TetMesh;
+use tetralod_io::{PolyData, point_arrays};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 

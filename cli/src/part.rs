@@ -7,7 +7,7 @@ use super::parts::{Folder, PLAN};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use tetralod::builder::parts::PartsError;
+use tetralod_build::parts::PartsError;
 
 /// Parts a mesh in space, so that each part is built on its own (`tetralod build --part`) and all are joined to one MT file (`tetralod
 /// join`): for meshes that one machine cannot hold, and for clusters.

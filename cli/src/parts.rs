@@ -12,15 +12,15 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
-use tetralod::builder::parts::{
+use tetralod::mesh::TetMesh;
+use tetralod_build::parts::{
     self, MOST_PARTS, Node, Part, PartUpdates, PartsError, Piecewise, Plan, Scratch,
 };
-use tetralod::builder::{
+use tetralod_build::{
     BuildConfig, BuildProgress, BuildResult, Construction, OnProgress, memory_needed_in_parts,
     memory_needed_in_pieces,
 };
-use tetralod::io::Pieces;
-use tetralod::mesh::TetMesh;
+use tetralod_io::Pieces;
 
 /// Parses `I/N`: a part and how many there are.
 pub fn of_all(text: &str) -> Result<[u32; 2]> {

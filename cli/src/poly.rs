@@ -6,8 +6,8 @@ use clap::ValueEnum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tetralod::io::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 use tetralod::view::area;
+use tetralod_io::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 
 /// A file to write, of a format that is known.
 #[derive(Clone, Debug)]

@@ -9,8 +9,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetralod::io::PolyData;
 use tetralod::view::{MeshView, Place, Probe, Span};
+use tetralod_io::PolyData;
 
 /// Interpolates all fields at points or along a line.
 ///
@@ -195,7 +195,7 @@ fn evenly(probe: &mut Probe<'_>, ends: [[f64; 3]; 2], count: u32) -> Samples {
 fn read_points(path: &Path) -> Result<Vec<[f64; 3]>> {
     let is_table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     if !is_table {
-        return Ok(tetralod::io::read(path)?.positions);
+        return Ok(tetralod_io::read(path)?.positions);
     }
     let name = || path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(name)?;

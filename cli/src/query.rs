@@ -13,9 +13,9 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tetralod::client::{Client, ClientError, Step};
 use tetralod::format::FormatError;
-use tetralod::io::{PointValues, PolyData};
 use tetralod::mt::{FieldInfo, MtInfo, UpdatePages};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
+use tetralod_io::{PointValues, PolyData};
 
 /// What the options look like in use.
 pub const EXAMPLES: &str = "\
@@ -84,13 +84,11 @@ impl Query {
     }
 
     /// The transfer function that the mesh is refined for, as [`Group::shown`] gives it.
-    #[cfg(feature = "render")]
     pub fn transfer(&self, field: &str) -> Result<Option<(Vec<[f64; 5]>, f64)>> {
         self.group.shown(field)
     }
 
     /// The field's name, if there is one.
-    #[cfg(feature = "render")]
     pub fn field(&self) -> Option<&str> {
         self.group.field()
     }

@@ -14,8 +14,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::geom::{Bounds, Camera, CameraState, Projection, ViewPreset};
-use tetralod::gpu::{GpuError, Renderer, wait};
-use tetralod::scene::{Background, Legend, Scene, SceneError};
+use tetralod_render::gpu::{GpuError, Renderer, wait};
+use tetralod_render::scene::{Background, Legend, Scene, SceneError};
 
 const PICTURE: &str = "Picture";
 const CAMERA: &str = "Camera";

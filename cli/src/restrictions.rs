@@ -4,9 +4,9 @@ use super::{files, output};
 use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use tetralod::measure::CellAngles;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MultiTessellation};
+use tetralod_build::measure::CellAngles;
 
 /// Heading in the help of these options.
 const KEEP: &str = "What must stay";

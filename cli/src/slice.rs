@@ -7,8 +7,8 @@ use super::query::Query;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
-use tetralod::io::PolyData;
 use tetralod::view::{Plane, Slice};
+use tetralod_io::PolyData;
 
 /// Writes the section of the mesh with a plane, with all fields interpolated in it.
 #[derive(clap::Args)]

@@ -9,9 +9,9 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
-use tetralod::io::{PointValues, PolyData};
 use tetralod::mt::FieldInfo;
 use tetralod::view::{StreamPoint, Streamline, TraceOptions, Tracer};
+use tetralod_io::{PointValues, PolyData};
 
 /// Writes the streamlines of a vector field that start at seeds.
 ///

@@ -5,8 +5,8 @@ use super::query::Query;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
-use tetralod::io::PolyData;
 use tetralod::view::BoundarySurface;
+use tetralod_io::PolyData;
 
 /// Writes the boundary of the mesh: the faces of tetrahedra behind which there is nothing, facing outwards, with all
 /// fields.

@@ -10,8 +10,8 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MultiTessellation};
-use tetralod::verify;
-use tetralod::verify::{Reference, Sample, VerifyReport};
+use tetralod_build::verify;
+use tetralod_build::verify::{Reference, Sample, VerifyReport};
 
 /// Checks every promise of an MT file against the mesh that it was built from; exit code 1 if one is broken.
 #[derive(clap::Args)]

@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use tetralod::format::{DecodeOptions, Decoder, Limits};
 use tetralod::geom::Bounds;
-use tetralod::io;
 use tetralod::mt::{Mt, MtInfo, MultiTessellation, UpdatePages};
 use tetralod::refine::{Front, LodCriterion, Need, Request};
 use tetralod::session::Session;
+use tetralod_io as io;
 
 /// Bytes of a script.
 pub const SCRIPT: usize = 16;
@@ -280,7 +280,7 @@ fn read_by_path(path: &Path) {
     for step in io::steps(path).unwrap_or_default().iter().take(3) {
         let _ = io::read_with(&step.path, &options(step.number));
     }
-    #[cfg(feature = "formats")]
+    #[cfg(not(target_arch = "wasm32"))]
     if let Ok(Some(pieces)) = io::Pieces::open(path, &options(0)) {
         let _ = pieces.counts();
         let _ = pieces.for_each(&mut |_| Ok::<(), io::ReadError>(()));

@@ -11,7 +11,6 @@ mod markdown;
 mod model;
 mod node_code;
 mod own;
-#[cfg(feature = "pictures")]
 mod pictures;
 mod published;
 mod query;
@@ -93,7 +92,7 @@ fn run() -> Result<()> {
     let mut args = std::env::args_os().skip(1);
     let (Some(folder), None) = (args.next(), args.next()) else { bail!("usage: paper FOLDER") };
     let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
-    let mesh = tetralod::generate::bucky(SIZE)?;
+    let mesh = tetralod_io::generate::bucky(SIZE)?;
     let findings = findings("bucky, generated", &mesh, data.as_deref())?;
     write(&findings, Path::new(&folder))
 }
@@ -125,7 +124,7 @@ fn findings(name: &str, mesh: &TetMesh, data: Option<&Path>) -> Result<Findings>
 fn small() -> Result<DataSet> {
     let (name, size) = SMALL;
     let others = [Recipe::InsertOwn, Recipe::Edge, Recipe::Delaunay, Recipe::HalfEdge];
-    DataSet::by_insertion(name, &tetralod::generate::bucky(size)?, &others)
+    DataSet::by_insertion(name, &tetralod_io::generate::bucky(size)?, &others)
 }
 
 /// Adds the rows of the data sets that have to be there already, one in memory at a time; gives those that are not, and the
@@ -164,7 +163,6 @@ fn write(findings: &Findings, folder: &Path) -> Result<()> {
     pictures(findings, &figures)
 }
 
-#[cfg(feature = "pictures")]
 fn pictures(findings: &Findings, folder: &Path) -> Result<()> {
     let Some(mut painter) = pictures::Painter::new()? else {
         eprintln!(
@@ -177,19 +175,13 @@ fn pictures(findings: &Findings, folder: &Path) -> Result<()> {
     painter.draw(&findings.figure_7, 7, folder)
 }
 
-#[cfg(not(feature = "pictures"))]
-fn pictures(_: &Findings, _: &Path) -> Result<()> {
-    eprintln!("built without pictures: they stay as they are");
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_small_volume_gives_a_page() {
-        let mesh = tetralod::generate::bucky(9).unwrap();
+        let mesh = tetralod_io::generate::bucky(9).unwrap();
         let all = findings("small", &mesh, None).unwrap();
         assert_eq!(all.rows.len(), 2 * Recipe::ALL.len());
         for curves in [&all.uniform, &all.variable] {

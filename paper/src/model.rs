@@ -3,11 +3,11 @@
 use anyhow::{Context, Result};
 use std::ops::ControlFlow;
 use std::path::Path;
-use tetralod::builder;
-use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Purpose, VertexMethod};
 use tetralod::mesh::{Field, Grid, TetMesh, repair};
 use tetralod::mt::{CurrentMesh, Mt, MtInfo, MultiTessellation};
 use tetralod::refine::Request;
+use tetralod_build as builder;
+use tetralod_build::{BuildConfig, BuildCriterion, Construction, Purpose, VertexMethod};
 
 use crate::query;
 
@@ -104,7 +104,7 @@ impl DataSet {
 
 /// A mesh from a file, fit to be built on.
 pub fn load(path: &Path) -> Result<TetMesh> {
-    let mesh = tetralod::io::read(path)?;
+    let mesh = tetralod_io::read(path)?;
     Ok(repair(mesh).with_context(|| path.display().to_string())?.0)
 }
 

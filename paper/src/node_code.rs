@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn measured_bits_are_those_of_the_papers_formula() {
-        let points = tetralod::generate::bucky(9).unwrap();
+        let points = tetralod_io::generate::bucky(9).unwrap();
         let data = DataSet::by_insertion("small", &points, &[Recipe::Delaunay, Recipe::HalfEdge]).unwrap();
         for model in &data.models {
             let codes = NodeCodes::of(&model.mt).unwrap().expect("a vertex-based MT");

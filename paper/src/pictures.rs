@@ -5,10 +5,10 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use tetralod::geom::Camera;
-use tetralod::gpu::{
+use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Triangles, VIRIDIS};
+use tetralod_render::gpu::{
     BoxLines, CellStyle, Colouring, EdgeLook, GpuError, Lighting, Look, Renderer, Style, wait,
 };
-use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Triangles, VIRIDIS};
 
 use crate::figures::Pair;
 use crate::query::Shown;

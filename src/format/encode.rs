@@ -377,3 +377,9 @@ fn put_sections(mt: &Mt, block: u32, index: &Index, models: &Models) -> Result<V
     };
     std::iter::once(shared).chain((0..mt.info().fields.len()).map(of_field)).collect()
 }
+
+impl crate::Coded for EncodeError {
+    fn code(&self) -> &'static str {
+        if matches!(self, Self::TooLong { .. }) { "bad-option" } else { "internal" }
+    }
+}

@@ -1,6 +1,6 @@
 //! What can be wrong with an MT file, each with where and what to do.
 
-use crate::mt::{BaseMeshError, MtKind, PageError, UpdateError};
+use crate::mt::{BaseMeshError, PageError, UpdateError};
 use thiserror::Error;
 
 /// What to do about a file that is broken as such.
@@ -36,12 +36,6 @@ pub enum FormatError {
         offset: u64,
         /// What the reader does not know.
         what: &'static str,
-    },
-    /// This build of the crate has no MTs of the kind in the file.
-    #[error("the file has an MT of the kind '{}', which this program was built without; build it with the feature `all-kinds`", .kind.name())]
-    Kind {
-        /// The kind.
-        kind: MtKind,
     },
     /// The bytes contradict the specification or their checksum.
     #[error("the MT file is damaged at byte {offset}: {what}; {AGAIN}")]
@@ -116,5 +110,18 @@ impl From<PageError> for FormatError {
 impl From<BaseMeshError> for FormatError {
     fn from(error: BaseMeshError) -> Self {
         Self::Base(error)
+    }
+}
+
+impl crate::Coded for FormatError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::NotMt => "not-mt",
+            Self::UnsupportedVersion { .. } | Self::UnsupportedFeature { .. } => "unsupported-version",
+            Self::Corrupt { .. } | Self::Update(_) | Self::Base(_) | Self::Page(_) => "corrupt",
+            Self::Field { .. } => "bad-option",
+            Self::Truncated { .. } => "truncated",
+            Self::Limit { .. } => "limit",
+        }
     }
 }

@@ -23,12 +23,8 @@ const LIMIT: f64 = 100.0;
 const HOME: [f64; 2] = [-1.05, 0.42];
 
 /// How points become a picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(
-    any(feature = "web", feature = "gpu"),
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "camelCase")
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub enum Projection {
     /// What is farther away looks smaller.
     #[default]
@@ -58,12 +54,8 @@ pub enum ViewPreset {
 }
 
 /// Where a camera is, as plain numbers: to be kept, sent and set again.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    any(feature = "web", feature = "gpu"),
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "camelCase")
-)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub struct CameraState {
     /// What it looks at, in model units.
     pub target: [f64; 3],

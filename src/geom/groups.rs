@@ -4,7 +4,8 @@ use std::ops::Range;
 
 /// Numbers sorted into groups `0..count`, in one array; each group keeps the order in which its numbers came.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Groups {
+#[doc(hidden)]
+pub struct Groups {
     /// Where each group starts in `items`, and the end of the last one.
     starts: Vec<u32>,
     items: Vec<u32>,

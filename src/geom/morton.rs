@@ -2,7 +2,7 @@
 
 /// Where a cell lies on a curve through all cells of a cube (Morton 1966); of each coordinate the low 21 bits count.
 #[inline]
-pub(crate) fn morton([x, y, z]: [u32; 3]) -> u64 {
+pub fn morton([x, y, z]: [u32; 3]) -> u64 {
     spread(x) | spread(y) << 1 | spread(z) << 2
 }
 

@@ -4,7 +4,8 @@ use super::Groups;
 use std::ops::RangeInclusive;
 
 /// Points on the lattice, sorted into the boxes of a regular grid.
-pub(crate) struct PointGrid {
+#[doc(hidden)]
+pub struct PointGrid {
     points: Vec<[i32; 3]>,
     low: [i32; 3],
     /// Edges of a box.

@@ -2,7 +2,8 @@
 //! numbers is `u32`, `u64` or `u128`, into which keys are packed.
 
 /// Sorts a few items where they are; equal ones stay in their order.
-pub(crate) fn sort_few<T: Copy>(items: &mut [T], comes_before: impl Fn(&T, &T) -> bool) {
+#[doc(hidden)]
+pub fn sort_few<T: Copy>(items: &mut [T], comes_before: impl Fn(&T, &T) -> bool) {
     for end in 1..items.len() {
         let item = items[end];
         let mut at = end;
@@ -15,13 +16,15 @@ pub(crate) fn sort_few<T: Copy>(items: &mut [T], comes_before: impl Fn(&T, &T) -
 }
 
 /// A key that sorts numbers as [`f64::total_cmp`] does.
-pub(crate) fn total_order(x: f64) -> u64 {
+#[doc(hidden)]
+pub fn total_order(x: f64) -> u64 {
     let bits = x.to_bits();
     if x.is_sign_negative() { !bits } else { bits | 1 << 63 }
 }
 
 /// The bits of a number, which are equal where numbers are, though zero has two signs: to look numbers up.
-pub(crate) fn bits_of(x: f64) -> u64 {
+#[doc(hidden)]
+pub fn bits_of(x: f64) -> u64 {
     (x + 0.0).to_bits()
 }
 

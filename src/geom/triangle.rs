@@ -26,7 +26,8 @@ pub fn nearest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
 }
 
 /// The barycentric coordinates of a point on a triangle; those of the first corner if the triangle has no area.
-pub(crate) fn weights_on_triangle(q: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
+#[doc(hidden)]
+pub fn weights_on_triangle(q: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
     weights_of_projection(q, corners).map_or([1.0, 0.0, 0.0], |[v, w]| [1.0 - v - w, v, w])
 }
 

@@ -6,7 +6,8 @@ use std::borrow::Cow;
 use std::ops::RangeInclusive;
 
 /// Triangles sorted into the cells of a regular grid.
-pub(crate) struct TriangleGrid {
+#[doc(hidden)]
+pub struct TriangleGrid {
     pub corners: Vec<[DVec3; 3]>,
     low: DVec3,
     side: f64,
@@ -81,7 +82,6 @@ impl TriangleGrid {
     }
 
     /// Whether one of the triangles comes within `radius` of `p`: one that does, or else none. `first` is tried before all others.
-    #[cfg(feature = "build")]
     pub fn any_within(&self, p: DVec3, radius: f64, first: u32) -> Option<u32> {
         let is_near = |i: u32| {
             let corners = self.corners.get(i as usize);
@@ -121,7 +121,6 @@ impl TriangleGrid {
 
     /// Calls `visit` with the triangles that come within `most` of `p`, the nearest one first, each with its nearest point and the
     /// distance, until it returns true.
-    #[cfg(feature = "build")]
     pub fn outwards(&self, p: DVec3, most: f64, mut visit: impl FnMut(u32, DVec3, f64) -> bool) {
         let most = most.min(self.whole(p));
         // In shells, each twice as wide as the one before.

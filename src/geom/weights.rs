@@ -4,12 +4,14 @@ use super::orient3d;
 use glam::{DMat3, DVec3};
 
 /// Points are taken to be on the lattice if they are nearer than this, in its steps.
-pub(crate) const ON_LATTICE: f64 = 1e-7;
+#[doc(hidden)]
+pub const ON_LATTICE: f64 = 1e-7;
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face. Builders allow for more.
 const SIDE_SLACK: f64 = 1e-10;
 
 /// A tetrahedron on the lattice in which points are looked for: most are clearly outside, which is told at little cost.
-pub(crate) struct TetPlaces {
+#[doc(hidden)]
+pub struct TetPlaces {
     corners: [[i32; 3]; 4],
     /// For each face a normal inwards, of twice its area, and a corner of the face.
     faces: [(DVec3, DVec3); 4],

@@ -2,6 +2,8 @@
 
 use crate::geom::Groups;
 use crate::mesh::{FACES, MeshError, NONE};
+use crate::threads;
+use std::ops::Range;
 
 /// Most tetrahedra in a mesh: its faces, four a tetrahedron, are counted in 32 bits.
 pub const MAX_TETS: usize = (1 << 30) - 1;
@@ -9,7 +11,8 @@ pub const MAX_TETS: usize = (1 << 30) - 1;
 /// One side of a face: the face of one tetrahedron. A number, for sorting: the face's vertices in increasing order, and
 /// `4 · tet + i` for face `i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct HalfFace(u128);
+#[doc(hidden)]
+pub struct HalfFace(u128);
 
 impl HalfFace {
     fn new([a, b, c]: [u32; 3], code: u32) -> Self {
@@ -62,7 +65,8 @@ pub(crate) fn is_odd([a, b, c]: [u32; 3]) -> bool {
 
 /// All faces of tetrahedra, by their smallest vertices. The rest is sorted when they are read: that takes a quarter of the memory of a
 /// sorted list.
-pub(crate) struct FaceTable<'a> {
+#[doc(hidden)]
+pub struct FaceTable<'a> {
     tets: &'a [[u32; 4]],
     /// Where the faces of each bucket begin; one more than there are buckets.
     starts: Vec<u32>,
@@ -137,7 +141,8 @@ pub fn neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, MeshError> {
 
 /// The neighbours of the tetrahedra of a table of faces. `fits` may refuse a face of several tetrahedra; it gets whether the
 /// first two of them lie on the same side.
-pub(crate) fn match_faces<E>(
+#[doc(hidden)]
+pub fn match_faces<E>(
     faces: &FaceTable<'_>,
     fits: impl Fn(&[HalfFace], bool) -> Result<(), E>,
 ) -> Result<Vec<[u32; 4]>, E> {
@@ -155,7 +160,8 @@ pub(crate) fn match_faces<E>(
 }
 
 /// The faces without neighbour, each with its tetrahedron, counter-clockwise when seen from outside. Free slots have none.
-pub(crate) fn boundary_faces<'a>(
+#[doc(hidden)]
+pub fn boundary_faces<'a>(
     tets: &'a [[u32; 4]],
     neighbors: &'a [[u32; 4]],
 ) -> impl Iterator<Item = (u32, [u32; 3])> + 'a {
@@ -220,6 +226,9 @@ pub(crate) fn topology_of(points: usize, tets: &[[u32; 4]], neighbors: Vec<[u32;
     Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors }
 }
 
+/// So many vertices are looked at by one thread at a time.
+const SHARE: usize = 1 << 12;
+
 /// For each vertex whether the mesh is not a 3-manifold there, as [`Topology`] has it, of those that are `wanted`.
 pub(crate) fn non_manifold(
     points: usize,
@@ -232,16 +241,11 @@ pub(crate) fn non_manifold(
         let star = stars.of(v);
         wanted(v) && !star.is_empty() && !scratch.link_is_sphere_or_disc(v as u32, star, tets, neighbors)
     };
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        (0..points).into_par_iter().map_init(LinkScratch::default, is_marked).collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    {
+    let of_range = |range: Range<usize>| {
         let mut scratch = LinkScratch::default();
-        (0..points).map(|v| is_marked(&mut scratch, v)).collect()
-    }
+        range.map(|v| is_marked(&mut scratch, v)).collect::<Vec<bool>>()
+    };
+    threads::map(points, SHARE, of_range).concat()
 }
 
 /// The tetrahedra around each of so many vertices, in increasing order.
@@ -309,7 +313,8 @@ impl LinkScratch {
 
 /// Disjoint groups of small numbers.
 #[derive(Default)]
-pub(crate) struct DisjointSets {
+#[doc(hidden)]
+pub struct DisjointSets {
     parents: Vec<u32>,
     count: usize,
 }
@@ -323,7 +328,6 @@ impl DisjointSets {
     }
 
     /// How many groups there are.
-    #[cfg(feature = "build")]
     pub fn count(&self) -> usize {
         self.count
     }

@@ -2,7 +2,8 @@
 
 /// A set of small numbers, with one bit for each; it grows as needed.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct BitSet {
+#[doc(hidden)]
+pub struct BitSet {
     words: Vec<u64>,
 }
 

@@ -3,7 +3,6 @@
 use robust::{Coord, Coord3D};
 
 use crate::mesh::adjacency::{FaceTable, HalfFace, check_indices, crowded, face_of, match_faces};
-#[cfg(feature = "build")]
 use crate::mesh::adjacency::{Topology, topology_of};
 use crate::mesh::{MeshError, TetMesh};
 use crate::threads;
@@ -20,8 +19,8 @@ pub fn check(mesh: &TetMesh) -> Result<(), MeshError> {
 }
 
 /// Checks as [`check`] does that a mesh is valid, and works out its [`Topology`].
-#[cfg(feature = "build")]
-pub(crate) fn check_topology(mesh: &TetMesh) -> Result<Topology, MeshError> {
+#[doc(hidden)]
+pub fn check_topology(mesh: &TetMesh) -> Result<Topology, MeshError> {
     Ok(topology_of(mesh.positions.len(), &mesh.tets, check_neighbors(mesh)?))
 }
 
@@ -53,7 +52,8 @@ fn check_tets(mesh: &TetMesh) -> Result<Vec<[u32; 4]>, MeshError> {
 }
 
 /// Checks what holds before geometry is looked at: lengths, finite coordinates, indices in range.
-pub(crate) fn check_arrays(mesh: &TetMesh) -> Result<(), MeshError> {
+#[doc(hidden)]
+pub fn check_arrays(mesh: &TetMesh) -> Result<(), MeshError> {
     if mesh.tets.is_empty() {
         return Err(MeshError::Empty);
     }

@@ -2,9 +2,7 @@
 //! does: how the connectivity of a base mesh is coded. (Szymczak and Rossignac 1999; Gumhold, Guthe and Strasser 1999.)
 
 use super::FACES;
-#[cfg(any(feature = "build", test))]
 use super::NONE;
-#[cfg(any(feature = "build", test))]
 use super::neighbors;
 use crate::geom::{orient3d, sort_few, total_order};
 use glam::DVec3;
@@ -249,9 +247,9 @@ fn at(q: [i32; 3]) -> DVec3 {
 }
 
 /// The order in which a mesh grows.
-#[cfg(any(feature = "build", test))]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct GrowthOrder {
+#[doc(hidden)]
+pub struct GrowthOrder {
     /// The new number of each vertex; [`NONE`] where no tetrahedron has it.
     pub number: Vec<u32>,
     /// The vertices in their new order.
@@ -262,7 +260,6 @@ pub(crate) struct GrowthOrder {
     pub tets: Vec<[u32; 4]>,
 }
 
-#[cfg(any(feature = "build", test))]
 impl GrowthOrder {
     /// The new number of a vertex, which it gets when it is asked for first.
     fn number(&mut self, growth: &mut Growth, positions: &[[i32; 3]], v: u32) -> u32 {
@@ -282,8 +279,8 @@ impl GrowthOrder {
 
 /// Numbers vertices and orders tetrahedra as they come when the mesh grows over its faces from its first tetrahedron. What is in that order
 /// already stays as it is. `tets` must be those of a mesh, positive, and name no vertex beyond `positions`.
-#[cfg(any(feature = "build", test))]
-pub(crate) fn growth_order(positions: &[[i32; 3]], tets: &[[u32; 4]]) -> GrowthOrder {
+#[doc(hidden)]
+pub fn growth_order(positions: &[[i32; 3]], tets: &[[u32; 4]]) -> GrowthOrder {
     // A mesh has no face of three tetrahedra; without neighbours, each one stays where it is.
     let neighbors = neighbors(tets).unwrap_or_else(|_| vec![[NONE; 4]; tets.len()]);
     let mut order = GrowthOrder { number: vec![NONE; positions.len()], ..GrowthOrder::default() };

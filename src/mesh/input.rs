@@ -4,7 +4,6 @@ use std::fmt;
 use std::path::PathBuf;
 
 use crate::mesh::Field;
-#[cfg(feature = "build")]
 use crate::mesh::Middles;
 
 /// What is known of the input that a mesh was read from. A mesh that was made otherwise has none of it.
@@ -21,8 +20,8 @@ pub struct MeshInput {
     /// The files that it was read from.
     pub files: SourceFiles,
     /// The middles of its cells, until the mesh is passed on.
-    #[cfg(feature = "build")]
-    pub(crate) middles: Middles,
+    #[doc(hidden)]
+    pub middles: Middles,
 }
 
 /// The files that a mesh was read from: the one that was given, and those that it names. They are no part of what the mesh is: all are
@@ -64,7 +63,6 @@ impl MeshInput {
     pub fn append(&mut self, part: Self) {
         self.cells.append(part.cells);
         self.files.0.extend(part.files.0);
-        #[cfg(feature = "build")]
         self.middles.append(part.middles);
         for note in part.notes {
             match note {

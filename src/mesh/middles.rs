@@ -16,7 +16,8 @@ use crate::threads;
 
 /// Points in the middle of others: one after the other the point, how many others, and these.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Middles(Vec<u32>);
+#[doc(hidden)]
+pub struct Middles(Vec<u32>);
 
 impl Middles {
     /// Takes a point in the middle of these corners; not one that is a corner itself, as where cells are collapsed.
@@ -46,7 +47,8 @@ impl Middles {
 /// Puts middles of cells that fold onto straight edges and faces, and notes how many, and how far they moved.
 ///
 /// Values stay: in the middle of a straight edge, too, a point has the same parameters.
-pub(crate) fn straighten(mesh: &mut TetMesh) {
+#[doc(hidden)]
+pub fn straighten(mesh: &mut TetMesh) {
     let middles = std::mem::take(&mut mesh.input.middles);
     if middles.0.is_empty() || mesh.tets.is_empty() {
         return;

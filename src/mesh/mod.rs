@@ -6,44 +6,43 @@ mod cell_data;
 mod changed_blocks;
 mod check;
 mod error;
-#[cfg(feature = "build")]
 mod geometry_field;
 mod grow;
 mod histogram;
 mod input;
 mod kuhn;
 mod layered_grid;
-#[cfg(feature = "build")]
 mod middles;
 mod piece;
 mod repair;
 mod series;
 mod tet_mesh;
 
-#[cfg(feature = "build")]
-pub(crate) use adjacency::DisjointSets;
-pub(crate) use adjacency::{FaceTable, boundary_faces, match_faces};
+#[doc(hidden)]
+pub use adjacency::DisjointSets;
+#[doc(hidden)]
+pub use adjacency::{FaceTable, boundary_faces, match_faces};
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
-pub(crate) use bit_set::BitSet;
+#[doc(hidden)]
+pub use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 pub use check::check;
-#[cfg(feature = "parts")]
-pub(crate) use check::check_arrays;
-#[cfg(feature = "build")]
-pub(crate) use check::check_topology;
+#[doc(hidden)]
+pub use check::check_arrays;
+#[doc(hidden)]
+pub use check::check_topology;
 pub use error::MeshError;
-#[cfg(feature = "build")]
 pub use geometry_field::GeometryField;
-#[cfg(any(feature = "build", test))]
-pub(crate) use grow::growth_order;
+#[doc(hidden)]
+pub use grow::growth_order;
 pub(crate) use grow::{Gate, Growth};
 pub use histogram::Histogram;
 pub(crate) use histogram::{Sum, volume_of};
 pub use input::{CellNumbers, InputCell, MeshInput, Note, SourceFiles};
 pub use kuhn::kuhn_tets;
 pub use layered_grid::{GridArray, LayeredGrid};
-#[cfg(feature = "build")]
-pub(crate) use middles::{Middles, straighten};
+#[doc(hidden)]
+pub use middles::{Middles, straighten};
 pub use piece::MeshPiece;
 pub use repair::{MeshFindings, RepairLevel, RepairReport, findings, repair, repair_at};
 pub use series::StepError;

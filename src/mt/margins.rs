@@ -9,7 +9,8 @@ use super::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, UpdateId};
 /// that tetrahedron was created. So the range of values of what an update removes, widened by the update's error, must hold that of
 /// each tetrahedron that it creates, widened by the error of the update which removes that one.
 #[derive(Debug)]
-pub(crate) struct Margins {
+#[doc(hidden)]
+pub struct Margins {
     /// Levels of each field's whole range: by so many an error of 1 widens a range.
     levels: Vec<f64>,
     /// The ranges of levels of what each update removes, field by field.
@@ -18,7 +19,8 @@ pub(crate) struct Margins {
 
 /// An update whose error is too large for one of its parents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Excess {
+#[doc(hidden)]
+pub struct Excess {
     pub update: UpdateId,
     pub parent: UpdateId,
     pub field: usize,
@@ -35,14 +37,12 @@ impl Margins {
         Self { levels, removed: Vec::new() }
     }
 
-    #[cfg(feature = "build")]
     pub fn fields(&self) -> usize {
         self.levels.len()
     }
 
     /// By how much the error of a parent must be larger, if a tetrahedron between the two is so many levels beyond the range of what
     /// the parent removes.
-    #[cfg(feature = "build")]
     pub fn error_of(&self, field: usize, beyond: i32) -> f64 {
         f64::from(beyond) / self.levels[field] * (1.0 + 1e-9)
     }

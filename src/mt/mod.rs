@@ -17,7 +17,6 @@ mod facts;
 mod half_edge;
 mod margins;
 mod mesh;
-mod other_kinds;
 mod ranks;
 mod replay;
 mod stats;
@@ -32,23 +31,23 @@ pub use edge::store::{EdgeMt, EdgeUpdate, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSp
 pub use error::{ErrorCode, PageError, UpdateError};
 pub use exact::{Exact, ExactValues};
 pub use explicit::check::MtFault;
-#[cfg(feature = "build")]
 pub use explicit::check::check_errors;
 pub use explicit::store::{ExplicitMt, ExplicitUpdate};
 pub(crate) use facts::{MtFacts, VOLUME_BINS, level_volumes};
-#[cfg(feature = "build")]
-pub(crate) use half_edge::builder::{Forest, HalfEdgeBuilder, NextUpdate, by_corner};
+#[doc(hidden)]
+pub use half_edge::builder::{Forest, HalfEdgeBuilder, NextUpdate, by_corner};
 pub use half_edge::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
-pub(crate) use margins::{Excess, Margins};
+#[doc(hidden)]
+pub use margins::{Excess, Margins};
 pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
-#[cfg(feature = "build")]
-pub(crate) use mesh::current::mix;
+#[doc(hidden)]
+pub use mesh::current::mix;
 pub use mesh::current::{CurrentMesh, MeshChanges};
 pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
 pub use replay::ReplayError;
-#[cfg(feature = "build")]
-pub(crate) use replay::canonical;
+#[doc(hidden)]
+pub use replay::canonical;
 pub use stats::{MtStats, stats};
 pub use vertex::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 pub use vertex::store::{NodeBits, VertexMt};

@@ -75,7 +75,8 @@ pub(super) fn named(mesh: &CurrentMesh, t: u32) -> [u32; 4] {
 }
 
 /// The even permutation of `tet` that is ascending but, maybe, for the last two.
-pub(crate) fn canonical(mut tet: [u32; 4]) -> [u32; 4] {
+#[doc(hidden)]
+pub fn canonical(mut tet: [u32; 4]) -> [u32; 4] {
     let mut odd = false;
     for (i, j) in [(0, 1), (1, 2), (2, 3), (0, 1), (1, 2), (0, 1)] {
         if tet[i] > tet[j] {

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 /// What has changed since the last call, so that callers need not look at everything.
 #[derive(Debug, Default)]
-pub(crate) struct Behind {
+#[doc(hidden)]
+pub struct Behind {
     /// Kept from the first time on.
     since: Option<MeshChanges>,
 }

@@ -11,8 +11,6 @@ mod pieces;
 mod quantity;
 mod reading;
 
-#[cfg(feature = "web-tools")]
-pub(crate) use behind::Behind as MeshFollower;
 pub use blocks::{BlockProgress, BlockState, MappedBlock, WantedBytes};
 pub use quantity::TetQuantity;
 pub use reading::Reading;
@@ -76,8 +74,6 @@ pub struct Session {
     behind: Behind,
     /// What has changed in it since [`Session::take_changes`] was last called.
     taken: Behind,
-    /// What has changed in it since [`Session::take_copied`] was last called.
-    copied: Behind,
     slice: Slice,
     /// The plane of the slice, and what has changed since that was last asked for.
     sliced: (Option<Plane>, Behind),
@@ -276,8 +272,8 @@ impl Session {
     }
 
     /// The mesh as the last call that brought it up to date left it, for readers that share the session.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn last_view(&self) -> MeshView<'_> {
+    #[doc(hidden)]
+    pub fn last_view(&self) -> MeshView<'_> {
         view(self.front.as_ref(), &self.shown)
     }
 
@@ -288,17 +284,6 @@ impl Session {
         self.catch_up();
         let MeshView { positions, tets, .. } = view(self.front.as_ref(), &self.shown);
         self.taken.take(positions.len(), tets.len())
-    }
-
-    /// The same for one more reader, since this was last called; everything with `all`.
-    #[cfg(feature = "web-session")]
-    pub(crate) fn take_copied(&mut self, all: bool) -> MeshChanges {
-        self.catch_up();
-        if all {
-            self.copied = Behind::default();
-        }
-        let MeshView { positions, tets, .. } = view(self.front.as_ref(), &self.shown);
-        self.copied.take(positions.len(), tets.len())
     }
 
     /// The isosurface of the current mesh, at a value in units of the field.
@@ -350,8 +335,8 @@ impl Session {
     }
 
     /// The isosurfaces and the section as they were last asked for.
-    #[cfg(all(feature = "web", feature = "gpu", target_arch = "wasm32"))]
-    pub(crate) fn last_surfaces(&self) -> (&IsoSurface, &Slice) {
+    #[doc(hidden)]
+    pub fn last_surfaces(&self) -> (&IsoSurface, &Slice) {
         (&self.surface, &self.slice)
     }
 
@@ -461,7 +446,6 @@ impl Session {
         let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]);
         self.behind.add(&changes, shown.stale);
         self.taken.add(&changes, shown.stale);
-        self.copied.add(&changes, shown.stale);
         self.sliced.1.add(&changes, shown.stale);
         for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
             shown.positions[slot] = lattice.point(mesh.positions()[slot]);
@@ -516,4 +500,14 @@ fn bounds(front: &Front, mt: &Mt, request: &Request, outcome: &Outcome) -> Vec<f
         if measured { asked * excess } else { error.error().max(need_floor(mt.info(), need)) }
     };
     request.needs.iter().map(bound).collect()
+}
+
+impl crate::Coded for SessionError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::NotReady | Self::ExactMissing => "not-ready",
+            Self::Request(_) | Self::Isovalue => "bad-option",
+            Self::Format(error) => error.code(),
+        }
+    }
 }

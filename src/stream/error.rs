@@ -75,3 +75,15 @@ fn status_advice(status: u16) -> &'static str {
         _ => "the server must answer Range requests with 206, or with 200 and the whole file",
     }
 }
+
+impl crate::Coded for StreamError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Status(_) | Self::Network(_) | Self::Timeout => "network",
+            Self::Blocked => "cors",
+            Self::Changed => "changed",
+            Self::WebPage | Self::Encoded(_) | Self::WrongRange(_) => "server",
+            Self::Unreadable(_) => "network",
+        }
+    }
+}

@@ -4,8 +4,6 @@
 //! `HttpSource` (feature `http`) over a server. In pages `ranges.js` of the package drives the same loader. Nothing
 //! here knows what the bytes mean.
 
-#[cfg(feature = "http")]
-mod cache;
 mod error;
 #[cfg(feature = "http")]
 mod http;
@@ -15,13 +13,9 @@ mod reassembly;
 mod response;
 mod source;
 
-#[cfg(feature = "http")]
-pub use cache::CacheFolder;
 pub use error::StreamError;
 #[cfg(feature = "http")]
-pub use http::HttpOptions;
-#[cfg(feature = "http")]
-pub use http::HttpSource;
+pub use http::{CacheFolder, HttpOptions, HttpSource};
 pub use loader::{Action, Failure, Loader, LoaderOptions, Traffic, WantedRange};
 pub use response::ResponseHead;
 pub use source::{Arrived, FileSource, RangeSource};

@@ -137,8 +137,8 @@ impl Medium {
 
     /// The first and the last value where it bends, and a table of `count` values between them, evenly spaced: colour and extinction
     /// of each, then for each the integral over the values below it of colour times extinction, and of extinction.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn table(&self, count: usize) -> ([f64; 2], Vec<[f32; 4]>) {
+    #[doc(hidden)]
+    pub fn table(&self, count: usize) -> ([f64; 2], Vec<[f32; 4]>) {
         let [first, last] = [self.knots[0].value, self.knots[self.knots.len() - 1].value];
         // A constant medium has a table, too.
         let last = if last > first { last } else { first + 1.0 };

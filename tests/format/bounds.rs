@@ -4,11 +4,11 @@ use crate::reader;
 use crate::support::files::{assemble, decode, in_blocks, sections};
 use crate::support::meshes::{bent, blocks, hilly};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{Decoder, EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, lattice_box};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, MultiTessellation, stats};
+use tetralod_build::{BuildConfig, build};
 
 fn decoder(bytes: &[u8]) -> Decoder {
     let mut decoder = Decoder::default();

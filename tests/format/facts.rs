@@ -2,10 +2,10 @@
 
 use crate::support::meshes::{bent, cube, hilly};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, UpdatePages};
+use tetralod_build::{BuildConfig, build};
 
 fn is_same(mt: &Mt, name: &str) {
     // In pages anew nothing is noted.
@@ -21,7 +21,7 @@ fn is_same(mt: &Mt, name: &str) {
 fn files_are_the_same_by_what_the_builder_notes() {
     let mut meshes: Vec<(&str, TetMesh)> =
         vec![("bent", bent(8)), ("cube", cube(9, &[hilly, |[x, y, _]| x * y]))];
-    meshes.push(("bucky", tetralod::generate::bucky(15).expect("a volume")));
+    meshes.push(("bucky", tetralod_io::generate::bucky(15).expect("a volume")));
     for (name, mesh) in meshes {
         for all_fields in [false, true] {
             let config = BuildConfig { all_fields, block_bits: 6, ..BuildConfig::default() };

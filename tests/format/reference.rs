@@ -9,15 +9,15 @@ use crate::support::files::{encoded, field, in_blocks, small_info};
 use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, FieldPrecision, edge_mt};
 use tetralod::format::{Decoder, EncodeOptions, Index};
-use tetralod::generate;
 use tetralod::geom::Lattice;
 use tetralod::mesh::{Field, TetMesh, VectorPart};
 use tetralod::mt::{
     Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, EdgeUpdate, ErrorCode, FieldInfo, Mt, MtInfo,
     MtKind, MultiTessellation, UpdateId, UpdatePages, VertexId, VertexSplit,
 };
+use tetralod_build::{BuildConfig, FieldPrecision, edge_mt};
+use tetralod_io::generate;
 
 fn options() -> EncodeOptions {
     let metadata = [("tool".to_owned(), "hand".to_owned()), ("a".to_owned(), String::new())];

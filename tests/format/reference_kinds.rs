@@ -12,11 +12,11 @@ use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use tetralod::builder::{BuildConfig, BuildCriterion, Construction, FieldPrecision, Method};
 use tetralod::format::{EncodeOptions, encode};
-use tetralod::generate;
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{Exact, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId};
+use tetralod_build::{BuildConfig, BuildCriterion, Construction, FieldPrecision, Method};
+use tetralod_io::generate;
 
 /// Reads a file both ways; gives what was read.
 fn compare(bytes: &[u8]) -> (File, Vec<Change>) {
@@ -164,7 +164,7 @@ const METHODS: [(Method, BuildCriterion); 3] = [
 fn built(mesh: &TetMesh, (method, criterion): (Method, BuildCriterion), config: BuildConfig) -> Mt {
     let construction = Construction::new(MtKind::Vertex, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..config };
-    tetralod::builder::build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
+    tetralod_build::build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
 }
 
 fn precise(position_bits: u32, field_bits: u32) -> BuildConfig {
@@ -336,7 +336,7 @@ fn exact_values_are_read_alike() {
         let construction =
             Construction::new(kind, method, BuildCriterion::HalfEdge).expect("they go together");
         let config = BuildConfig { construction, all_lossless: true, ..precise(12, 9) };
-        let built = tetralod::builder::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
+        let built = tetralod_build::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
         let built = built.expect("a valid mesh");
         let spelled = built.mt.convert(MtKind::Explicit).expect("a valid MT");
         for mt in [spelled, built.mt].iter().filter(|mt| mt.info().kind != MtKind::Edge) {
@@ -374,7 +374,7 @@ fn errors_of_tetrahedra_are_read_alike() {
             .and_then(Construction::with_tet_errors)
             .expect("they go together");
         let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
-        let built = tetralod::builder::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
+        let built = tetralod_build::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
         let mt = in_blocks(&built.expect("a good mesh").mt, 5);
         let bytes = encode(&mt, &EncodeOptions::default()).expect("a complete MT");
         let (file, changes) = compare(&bytes);

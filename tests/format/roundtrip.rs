@@ -7,14 +7,14 @@ use crate::support::files::{
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{Decoder, EncodeError, EncodeOptions, encode_to};
-use tetralod::generate;
 use tetralod::geom::WIDE_BITS;
 use tetralod::mt::{
     ApplyUpdates, EdgeMt, EdgeUpdate, ExplicitMt, Mt, MtInfo, MtKind, MultiTessellation, UpdateError,
     UpdateId, UpdatePages,
 };
+use tetralod_build::{BuildConfig, build};
+use tetralod_io::generate;
 
 /// The file of an MT gives an MT of the same updates, and that the same file.
 fn comes_back(mt: &Mt, block_bits: u32) {

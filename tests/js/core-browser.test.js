@@ -59,8 +59,7 @@ for (const [name, hashes] of Object.entries(FILES)) {
   });
 }
 
-test("only files of other kinds than half-edge have the module with all kinds loaded", async () => {
-  const loaded = [];
+test("one wasm file is loaded, whatever the kind of the file and whatever is asked of its mesh", async () => {
   for (const name of ["small.mt", "small-vertex.mt"]) {
     const fresh = await browser.newPage();
     await fresh.goto(server.address);
@@ -69,29 +68,14 @@ test("only files of other kinds than half-edge have the module with all kinds lo
       const { MultiTessellation } = await import("tetralod");
       const mt = await MultiTessellation.open(`/${name}`);
       await mt.refine({ error: 0 });
+      await mt.surface();
+      await mt.isosurface(0.5);
       mt.free();
     }, name);
-    loaded.push(server.asked.slice(before).filter((file) => file.endsWith(".wasm")));
+    const loaded = server.asked.slice(before).filter((file) => file.endsWith(".wasm"));
     await fresh.close();
+    assert.deepEqual(loaded, ["tetralod_core_bg.wasm"], name);
   }
-  assert.deepEqual(loaded, [["tetralod_core_bg.wasm"], ["tetralod_core_bg.wasm", "tetralod_all_kinds_bg.wasm"]]);
-});
-
-test("the tools for meshes are loaded by the first call of one", async () => {
-  const fresh = await browser.newPage();
-  await fresh.goto(server.address);
-  const before = server.asked.length;
-  await fresh.evaluate(async () => {
-    const { MultiTessellation } = await import("tetralod");
-    const mt = await MultiTessellation.open("/small.mt");
-    await mt.refine({ error: 0 });
-    await mt.surface();
-    await mt.isosurface(0.5);
-    mt.free();
-  });
-  const loaded = server.asked.slice(before).filter((file) => file.endsWith(".wasm"));
-  await fresh.close();
-  assert.deepEqual(loaded, ["tetralod_core_bg.wasm", "tetralod_tools_bg.wasm"]);
 });
 
 test("what was ended is refused by name", async () => {

@@ -40,14 +40,10 @@ const FILES = [
   "tetralod_build.d.ts",
   "tetralod_build.js",
   "tetralod_build_bg.wasm",
-  // The types of these modules are those of `tetralod_core`, or are not public.
-  "tetralod_all_kinds.js",
-  "tetralod_all_kinds_bg.wasm",
   "tetralod_core.d.ts",
   "tetralod_core.js",
   "tetralod_core_bg.wasm",
-  "tetralod_tools.js",
-  "tetralod_tools_bg.wasm",
+  // The types of this module are not public.
   "tetralod_viewer.js",
   "tetralod_viewer_bg.wasm",
   "three.d.ts",

@@ -21,7 +21,6 @@ let base;
 before(async () => {
   server = createServer(async ({ url }, response) => {
     if (url === "/core.wasm") return response.end(await readFile(at("tetralod_core_bg.wasm")));
-    if (url === "/tools.wasm") return response.end(await readFile(at("tetralod_tools_bg.wasm")));
     if (url === "/page.wasm") return response.writeHead(200, { "content-type": "text/html" }).end("<!doctype html>");
     if (url === "/text.wasm") return response.writeHead(200, { "content-type": "application/wasm" }).end("not wasm");
     return response.writeHead(404).end();
@@ -63,42 +62,22 @@ test("worker and wasm are taken from other places, or from a worker that is pass
   await works({ worker: new Worker(at("worker.js")), wasmUrl: at("tetralod_core_bg.wasm").href });
 });
 
-test("the tools for meshes are taken from another place, or their address is asked for by the name of its option", async () => {
-  const surface = async (how) => {
-    const mt = await MultiTessellation.open(bytes, how);
-    await mt.complete;
-    await mt.refine(options);
-    const { indices } = await mt.surface();
-    const { positions } = await mt.isosurface((mt.info.fields[0].min + mt.info.fields[0].max) / 2);
-    assert.equal(await mt.hash(), hash);
-    mt.free();
-    return [indices.length, positions.length];
-  };
-  const expected = await surface({});
-  assert.ok(expected.every((length) => length > 0));
-  assert.deepEqual(await surface({ toolsUrl: at("tetralod_tools_bg.wasm") }), expected);
-  assert.deepEqual(await surface({ toolsUrl: `${base}/tools.wasm`, worker: false }), expected);
-  await rejects(surface({ toolsUrl: `${base}/nothing.wasm` }), "wasm", /nothing\.wasm.*set `toolsUrl`.*"tetralod\/tools\.wasm"/);
-  await works({ toolsUrl: `${base}/nothing.wasm` });
-});
-
-test("a file of another kind than half-edge has the module with all kinds loaded, or `wasmUrl` leads to that one", async () => {
+test("files of any kind are read by the one module, whole or in pieces, and have all tools", async () => {
   const other = new Uint8Array(await readFile(`${folder}/small-vertex.mt`));
   const [first] = JSON.parse(await readFile(`${folder}/hashes-vertex.json`, "utf8"));
   const pieces = async function* () {
     for (let at = 0; at < other.length; at += 100) yield other.slice(at, at + 100);
   };
-  const wasmUrl = at("tetralod_all_kinds_bg.wasm");
   /** @type {[import("../../pkg/index.js").Source, object][]} */
-  const ways = [[other, {}], [pieces(), {}], [pieces(), { worker: false }], [new Blob([other]), {}], [other, { wasmUrl }]];
+  const ways = [[other, {}], [pieces(), {}], [pieces(), { worker: false }], [new Blob([other]), {}]];
   for (const [source, how] of ways) {
     const mt = await MultiTessellation.open(source, how);
     await mt.complete;
     await mt.refine(first.options);
     assert.equal(await mt.hash(), first.hash);
+    assert.ok((await mt.surface()).indices.length > 0);
     mt.free();
   }
-  await works({ wasmUrl });
 });
 
 test("the inline entry needs no other file, in a worker and in the caller's thread", async () => {

@@ -13,7 +13,8 @@ use tetralod::geom::{Bounds, Camera, Projection, ViewPreset};
 use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::ApplyUpdates;
 use tetralod::refine::{Front, LodCriterion, Need, Request, View};
-use tetralod::{generate, io};
+use tetralod_io as io;
+use tetralod_io::generate;
 
 const VIEWPORT: [f64; 2] = [900.0, 600.0];
 const ASPECT: f64 = VIEWPORT[0] / VIEWPORT[1];

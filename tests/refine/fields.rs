@@ -4,11 +4,11 @@
 use crate::subjects::{SUBJECTS, applied};
 use crate::support::meshes::{cube, hilly};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::geom::Bounds;
 use tetralod::mt::{EdgeMt, MtKind, MultiTessellation, UpdateId};
 use tetralod::refine::{LodCriterion, Need, Request, RequestError};
-use tetralod::verify;
+use tetralod_build::verify;
+use tetralod_build::{BuildConfig, BuildCriterion, Construction, Method, build};
 
 #[test]
 fn the_largest_error_is_that_of_some_field() {

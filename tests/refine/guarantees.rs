@@ -11,15 +11,17 @@ use crate::support::data::real_data;
 use crate::support::surfaces::{Interpolant, Mesh, Surface};
 use glam::{DMat4, DVec3, DVec4};
 use std::collections::BTreeMap;
-use tetralod::builder::Method;
 use tetralod::geom::Bounds;
 use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::{ApplyUpdates, ExplicitMt, Mt, MultiTessellation, UpdateId, VertexId};
 use tetralod::refine::{
     Budget, Criterion, Front, LodCriterion, Need, Region, Request, TetData, Transfer, View,
 };
-use tetralod::verify::Reference;
-use tetralod::{generate, io, verify};
+use tetralod_build::Method;
+use tetralod_build::verify;
+use tetralod_build::verify::Reference;
+use tetralod_io as io;
+use tetralod_io::generate;
 
 const KINDS: [(&str, How); 4] =
     [("edge", EDGE), ("half-edge", HALF_EDGE), ("Delaunay", DELAUNAY), ("insertion", INSERTED)];

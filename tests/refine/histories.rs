@@ -5,7 +5,6 @@ use crate::support::files::encoded;
 use crate::support::meshes::{blocks, tampered};
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::format::{EncodeError, EncodeOptions};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
@@ -13,6 +12,7 @@ use tetralod::mt::{
     VertexId, check_errors,
 };
 use tetralod::refine::{Front, LodCriterion, Need, Request};
+use tetralod_build::{BuildConfig, BuildCriterion, Construction, Method, build};
 
 /// As many values as a scan has, with noise that no neighbour shares.
 fn noisy(cells: [u32; 3], noise: f64, seed: u64) -> TetMesh {

@@ -4,9 +4,9 @@
 use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
+use tetralod_build::{BuildConfig, BuildCriterion, Construction, Method, build};
 
 /// The kinds and builders that move a boundary.
 const WAYS: [(MtKind, Method, BuildCriterion); 4] = [

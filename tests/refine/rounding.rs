@@ -5,11 +5,12 @@ use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{CurrentMesh, Mt, MtInfo, MtKind, MultiTessellation};
-use tetralod::verify::Reference;
-use tetralod::{measure, verify};
+use tetralod_build::measure;
+use tetralod_build::verify;
+use tetralod_build::verify::Reference;
+use tetralod_build::{BuildConfig, BuildCriterion, Construction, Method, build};
 
 /// A box with ever thinner layers towards its bottom, across which the field rises steeply; no vertex inside is on a lattice.
 fn layers(thinnest: f64) -> TetMesh {

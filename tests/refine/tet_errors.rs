@@ -6,7 +6,6 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
-use tetralod::builder::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 use tetralod::format::{Decoder, EncodeOptions, encode};
 use tetralod::geom::{Bounds, orient3d};
 use tetralod::mesh::{Field, TetMesh};
@@ -14,8 +13,9 @@ use tetralod::mt::{
     ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId,
 };
 use tetralod::refine::{Criterion, Front, LodCriterion, Need, Region, Request, TetData};
-use tetralod::verify;
-use tetralod::verify::Reference;
+use tetralod_build::verify;
+use tetralod_build::verify::Reference;
+use tetralod_build::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 
 fn config(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildConfig {
     let plain = Construction::new(kind, Method::Insert, BuildCriterion::Delaunay).expect("they go together");
@@ -133,7 +133,7 @@ fn scattered() -> TetMesh {
 
 static SUBJECTS: LazyLock<Vec<Subject>> = LazyLock::new(|| {
     vec![
-        Subject::new("bucky", tetralod::generate::bucky(13).expect("a size that is allowed")),
+        Subject::new("bucky", tetralod_io::generate::bucky(13).expect("a size that is allowed")),
         Subject::new("hills", cube(8, &[hilly, linear])),
         Subject::new("scattered points", scattered()),
     ]

@@ -7,9 +7,9 @@ use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
-use tetralod::measure::{Part, Reference, deviation};
 use tetralod::mt::{ErrorCode, MultiTessellation};
 use tetralod::refine::{Budget, Front, LodCriterion, Need, Region, Request};
+use tetralod_build::measure::{Part, Reference, deviation};
 
 /// A request in fractions of the subject's bounds and ranges.
 #[derive(Clone, Debug)]

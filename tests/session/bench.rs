@@ -1,10 +1,10 @@
 //! Promise: the benchmark measures what was done, with the clock that it is given, and takes whole files only.
 
 use crate::support::meshes::{built, cube, hilly};
-use tetralod::bench;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mt::MultiTessellation;
 use tetralod::session::SessionError;
+use tetralod_bench as bench;
 
 /// A clock that says a millisecond has passed whenever it is asked.
 fn ticking() -> impl FnMut() -> f64 {

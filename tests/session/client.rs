@@ -6,10 +6,8 @@ use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::time::Duration;
-use tetralod::builder::{BuildConfig, Construction, build};
 use tetralod::client::{Client, ClientError, ClientOptions};
 use tetralod::format::{DecodeOptions, EncodeOptions, FormatError, encode};
-use tetralod::generate;
 use tetralod::geom::Bounds;
 use tetralod::mt::{MtKind, MultiTessellation};
 use tetralod::refine::{Need, Request};
@@ -18,6 +16,8 @@ use tetralod::session::Session;
 use tetralod::stream::{
     Action, Arrived, FileSource, Loader, LoaderOptions, RangeSource, ResponseHead, StreamError, WantedRange,
 };
+use tetralod_build::{BuildConfig, Construction, build};
+use tetralod_io::generate;
 
 const BLOCK_BITS: u32 = 6;
 

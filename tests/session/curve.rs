@@ -2,13 +2,13 @@
 //! by blocks; enough, and not many more than needed, in files that come from front to back.
 
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{BlockInfo, DecodeOptions, Decoder, EncodeOptions, ErrorBytes, encode};
-use tetralod::generate;
 use tetralod::mesh::Field;
 use tetralod::mt::MtKind;
 use tetralod::refine::{Need, Request};
 use tetralod::session::Session;
+use tetralod_build::{BuildConfig, build};
+use tetralod_io::generate;
 
 const BLOCK_BITS: u32 = 6;
 

@@ -6,11 +6,11 @@ use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
-use tetralod::generate::by_name;
 use tetralod::mt::{MtKind, MultiTessellation};
 use tetralod::session::{Session, SessionError};
+use tetralod_build::{BuildConfig, build};
+use tetralod_io::generate::by_name;
 
 /// A small MT as the builder makes it, and the same spelled out, each with its number of updates.
 static FILES: LazyLock<[(Vec<u8>, u32); 2]> = LazyLock::new(|| {

@@ -10,7 +10,7 @@ use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
 use tetralod::refine::Request;
 use tetralod::session::Session;
-use tetralod::verify::{self, Reference};
+use tetralod_build::verify::{self, Reference};
 
 /// The MT as it was built, and spelled out.
 fn both(mesh: &TetMesh) -> [Mt; 2] {

@@ -3,13 +3,13 @@
 
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{DecodeOptions, EncodeOptions, encode};
-use tetralod::generate;
 use tetralod::geom::Bounds;
 use tetralod::mt::{CurrentMesh, MtKind};
 use tetralod::refine::{Need, Request};
 use tetralod::session::{BlockState, MappedBlock, Session};
+use tetralod_build::{BuildConfig, build};
+use tetralod_io::generate;
 
 const BLOCK_BITS: u32 = 6;
 

@@ -4,12 +4,12 @@
 use crate::support::meshes::{cube, hilly, linear};
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{DecodeOptions, EncodeOptions, encode};
 use tetralod::geom::Bounds;
 use tetralod::mt::{Mt, MtKind};
 use tetralod::refine::{Need, Request};
 use tetralod::session::{Session, SessionError, TetQuantity};
+use tetralod_build::{BuildConfig, build};
 
 const BLOCK_BITS: u32 = 5;
 

@@ -2,9 +2,9 @@
 
 use super::builder::Stored;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildResult, edge_mt};
 use tetralod::mesh::{Field, Grid, TetMesh, repair};
 use tetralod::mt::{EdgeMt, ErrorCode, MtKind, MultiTessellation, UpdateId};
+use tetralod_build::{BuildConfig, BuildResult, edge_mt};
 
 /// A field with hills, edges and a plateau.
 pub fn hilly([x, y, z]: [f64; 3]) -> f64 {

@@ -6,11 +6,11 @@ use crate::support::meshes::{cube, hilly};
 use crate::twin::{self, UNIT};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Camera;
-use tetralod::gpu::{CellShape, CellStyle, Look, Renderer, Style};
 use tetralod::mesh::NONE;
 use tetralod::refine::{Budget, Need, Request};
 use tetralod::session::Session;
 use tetralod::view::{IsoSurface, Medium, Triangles};
+use tetralod_render::gpu::{CellShape, CellStyle, Look, Renderer, Style};
 
 const SIZE: [u32; 2] = [120, 90];
 

@@ -5,9 +5,9 @@ use crate::scenes::Scene;
 use crate::twin::{self, AROUND, Lights, Triangle, UNIT};
 use glam::{DVec2, DVec3};
 use tetralod::geom::{Camera, Projection};
-use tetralod::gpu::{CellShape, CellStyle, Colouring, Look, Renderer, Style};
 use tetralod::mesh::FACES;
 use tetralod::view::{ClipPlane, ColourScale, VIRIDIS};
+use tetralod_render::gpu::{CellShape, CellStyle, Colouring, Look, Renderer, Style};
 
 const SIZE: [u32; 2] = [160, 120];
 

@@ -5,14 +5,14 @@
 //! tested here are not kept there: 0.5 % becomes 0.7 % in this picture.
 
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
-use tetralod::generate;
 use tetralod::geom::{Bounds, Camera};
 use tetralod::mt::MtKind;
 use tetralod::refine::{Need, Request, Transfer};
 use tetralod::session::Session;
 use tetralod::view::{Light, Medium};
+use tetralod_build::{BuildConfig, build};
+use tetralod_io::generate;
 
 const SIZE: [u32; 2] = [64, 48];
 const UNIT_LENGTH: f64 = 0.1;

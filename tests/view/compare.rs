@@ -5,12 +5,14 @@ use crate::support::meshes::{built, cube, hilly, linear};
 use crate::twin::{self, UNIT};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Camera;
-use tetralod::gpu::{Renderer, wait};
 use tetralod::mt::Mt;
 use tetralod::refine::Request;
-use tetralod::scene::{CellState, CompareState, IsosurfaceState, Scene, SceneState, SliceState, VolumeState};
 use tetralod::session::Session;
 use tetralod::view::Difference;
+use tetralod_render::gpu::{Renderer, wait};
+use tetralod_render::scene::{
+    CellState, CompareState, IsosurfaceState, Scene, SceneState, SliceState, VolumeState,
+};
 
 const SIZE: [u32; 2] = [96, 64];
 

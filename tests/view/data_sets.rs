@@ -9,10 +9,10 @@ use crate::support::data::real_data;
 use crate::twin;
 use std::path::{Path, PathBuf};
 use tetralod::geom::{Bounds, Camera};
-use tetralod::gpu::Renderer;
-use tetralod::io::{CellData, ReadOptions, read_with};
 use tetralod::mesh::{Field, Grid, TetMesh, neighbors, repair};
 use tetralod::view::Medium;
+use tetralod_io::{CellData, ReadOptions, read_with};
+use tetralod_render::gpu::Renderer;
 
 const SIZE: [u32; 2] = [64, 48];
 /// Two levels: what rounding and the noise of the background make is less.

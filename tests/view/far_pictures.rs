@@ -4,9 +4,9 @@ use crate::far::{FAR, Frame, NEAR, opened};
 use crate::support::meshes::{cube, hilly};
 use crate::twin;
 use tetralod::geom::{Bounds, Camera};
-use tetralod::gpu::wait;
 use tetralod::mesh::Field;
-use tetralod::scene::{
+use tetralod_render::gpu::wait;
+use tetralod_render::scene::{
     ArrowState, BoundaryState, CellState, ColourState, IsosurfaceState, PlaneState, Scene, SceneState,
     SliceState, StreamlineState, VolumeState,
 };

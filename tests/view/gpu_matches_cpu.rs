@@ -5,8 +5,8 @@ use crate::scenes::Scene;
 use crate::twin::{self, AROUND, Difference, Hit, Lights, Triangle, UNIT, picture, renderer, vec};
 use glam::DVec3;
 use tetralod::geom::Camera;
-use tetralod::gpu::{BoxLines, CellStyle, Colouring, Look, Renderer, Style};
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Light, Medium, Probe, Triangles, VIRIDIS};
+use tetralod_render::gpu::{BoxLines, CellStyle, Colouring, Look, Renderer, Style};
 
 const SIZE: [u32; 2] = [160, 120];
 /// What a pixel shows when all of it shows the same kind of thing.

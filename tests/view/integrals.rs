@@ -159,7 +159,6 @@ fn the_twin_has_the_integrals_of_theory() {
     }
 }
 
-#[cfg(feature = "vulkan")]
 #[test]
 fn pictures_have_the_integrals_of_theory() {
     use crate::twin::{self, UNIT};

@@ -5,8 +5,8 @@ use crate::scenes::Scene;
 use crate::twin::{self, AROUND, Hit, Lights, Triangle};
 use glam::DVec3;
 use tetralod::geom::{Camera, Ray};
-use tetralod::gpu::{Look, Renderer, Style};
 use tetralod::view::{ClipPlane, Light, Medium, Probe, Span, Triangles};
+use tetralod_render::gpu::{Look, Renderer, Style};
 
 /// A surface of a mixed picture.
 pub struct Part {

@@ -5,8 +5,8 @@ use crate::mixed::Mixed;
 use crate::scenes::Scene;
 use crate::twin::{self, UNIT};
 use tetralod::geom::{Camera, Projection};
-use tetralod::gpu::{Colouring, Lighting, Look, Renderer, SIDES, Style, wait};
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Medium, Plane, Slice, Triangles, VIRIDIS};
+use tetralod_render::gpu::{Colouring, Lighting, Look, Renderer, SIDES, Style, wait};
 
 const SIZE: [u32; 2] = [96, 72];
 

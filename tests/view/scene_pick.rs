@@ -6,10 +6,10 @@ use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Ray;
 use tetralod::mt::Mt;
 use tetralod::refine::Request;
-use tetralod::scene::{
+use tetralod::session::Session;
+use tetralod_render::scene::{
     ArrowState, BoundaryState, PlaneState, Scene, SceneState, SliceState, StreamlineState,
 };
-use tetralod::session::Session;
 
 const ONE: fn([f64; 3]) -> f64 = |_| 1.0;
 const NOTHING: fn([f64; 3]) -> f64 = |_| 0.0;

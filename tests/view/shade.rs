@@ -3,8 +3,8 @@
 use crate::twin::{self, UNIT};
 use glam::DVec3;
 use tetralod::geom::{Bounds, Camera, Projection};
-use tetralod::gpu::{Colouring, Lighting, Look, Renderer, Style};
 use tetralod::view::Triangles;
+use tetralod_render::gpu::{Colouring, Lighting, Look, Renderer, Style};
 
 const SIZE: [u32; 2] = [240, 180];
 

@@ -1,7 +1,7 @@
 //! Every shader parses, validates, and reads what Rust writes; without a GPU.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use tetralod::gpu::SHADERS;
+use tetralod_render::gpu::SHADERS;
 
 fn parsed(name: &str, source: &str) -> naga::Module {
     naga::front::wgsl::parse_str(source)

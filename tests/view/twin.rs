@@ -6,8 +6,8 @@ use crate::support::meshes::{blocks, linear};
 use glam::{DVec2, DVec3};
 use std::path::Path;
 use tetralod::geom::{Bounds, Camera, Ray};
-use tetralod::gpu::{Colouring, Lighting, Look, Renderer, Style, wait};
 use tetralod::view::{Medium, Triangles};
+use tetralod_render::gpu::{Colouring, Lighting, Look, Renderer, Style, wait};
 
 pub const UNIT: Bounds = Bounds { min: [0.0; 3], max: [1.0; 3] };
 

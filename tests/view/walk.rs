@@ -2,12 +2,12 @@
 
 use crate::support::random::Random;
 use std::ops::{ControlFlow, Range};
-use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
     Applied, ApplyUpdates, CurrentMesh, MeshChanges, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
 };
 use tetralod::view::MeshView;
+use tetralod_build::{BuildConfig, BuildCriterion, Construction, Method, build};
 
 /// The blocks of 64 entries in which two states of an array differ, as ranges of the new one.
 pub fn changed<T: PartialEq>(old: &[T], new: &[T]) -> Vec<Range<u32>> {

@@ -1,25 +1,18 @@
 /**
  * In place of `files.js` in `tetralod/inline`: the wasm modules and the worker are in the bundle. `inline.mjs` gives the content
- * of the three imports.
+ * of the two imports.
  */
 
 import packed from "embedded:wasm";
-import packedTools from "embedded:tools";
 import script from "embedded:worker";
 
 /** @type {Promise<Uint8Array> | undefined} */
 let bytes;
-/** @type {Promise<Uint8Array> | undefined} */
-let toolsBytes;
 /** @type {string | undefined} */
 let url;
 
-/** The bytes of the wasm module with MTs of all kinds. */
+/** The bytes of the wasm module. */
 export const coreWasm = () => (bytes ??= unpacked(packed));
-export const allKindsWasm = coreWasm;
-
-/** The bytes of the wasm module with the tools for meshes. */
-export const toolsWasm = () => (toolsBytes ??= unpacked(packedTools));
 
 async function unpacked(packed) {
   const stream = new Blob([Uint8Array.from(atob(packed), (c) => c.charCodeAt(0))]).stream();

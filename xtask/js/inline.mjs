@@ -1,6 +1,6 @@
 /**
- * Writes `inline.js` of the package in a folder that has all its other files: `index.js` with the wasm modules for MTs of all
- * kinds and for tools (deflated, as text) and the worker in it. One file, that imports nothing.
+ * Writes `inline.js` of the package in a folder that has all its other files: `index.js` with the wasm module
+ * (deflated, as text) and the worker in it. One file, that imports nothing.
  *
  * node xtask/js/inline.mjs FOLDER
  */
@@ -35,8 +35,8 @@ const replacing = (modules) => ({
   },
 });
 
-/** A wasm module as text. */
-const packed = async (name) => deflateSync(await readFile(join(folder, `tetralod_${name}_bg.wasm`)), { level: 9 }).toString("base64");
+/** The wasm module as text. */
+const packed = deflateSync(await readFile(join(folder, "tetralod_core_bg.wasm")), { level: 9 }).toString("base64");
 
 const worker = await build({
   ...OPTIONS,
@@ -44,7 +44,7 @@ const worker = await build({
   format: "iife",
   write: false,
   // The page sends it the bytes.
-  plugins: [replacing({ "./files.js": { contents: "export const coreWasm = () => undefined; export const [allKindsWasm, toolsWasm] = [coreWasm, coreWasm];" } })],
+  plugins: [replacing({ "./files.js": { contents: "export const coreWasm = () => undefined;" } })],
 });
 
 await build({
@@ -55,8 +55,7 @@ await build({
   plugins: [
     replacing({
       "./files.js": { contents: await readFile(fileURLToPath(new URL("inline-files.mjs", import.meta.url)), "utf8") },
-      "embedded:wasm": { contents: await packed("all_kinds"), loader: "text" },
-      "embedded:tools": { contents: await packed("tools"), loader: "text" },
+      "embedded:wasm": { contents: packed, loader: "text" },
       "embedded:worker": { contents: worker.outputFiles[0].text.trim(), loader: "text" },
     }),
   ],

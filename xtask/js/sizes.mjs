@@ -27,11 +27,9 @@ const LIMITS = {
   "./worker": 10_800,
   "./viewer-worker": 19_600,
   "./build-worker": 5_500,
-  "./core.wasm": 170_000,
-  "./all-kinds.wasm": 242_000,
-  "./tools.wasm": 61_000,
+  "./core.wasm": 290_000,
   "./viewer.wasm": 450_000,
-  "./build.wasm": 600_000,
+  "./build.wasm": 560_000,
 };
 
 const folder = resolve(process.argv[2]);

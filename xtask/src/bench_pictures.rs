@@ -16,8 +16,7 @@ the lists of pixels, *bytes/tet* that of the mesh alone. The goal in software is
 /// Measures with the options of the benchmark, and puts its table into the page, in place of the one of the same adapter
 /// and size.
 pub fn run(options: &[String]) -> Result<()> {
-    let mut command =
-        shell::cargo(["bench", "--package", "tetralod", "--features", "vulkan", "--bench", "pictures"]);
+    let mut command = shell::cargo(["bench", "--package", "tetralod", "--bench", "pictures"]);
     let table = shell::output(command.args(["--", "run"]).args(options))?;
     println!("{table}");
     let old = benchmarks_page::read(Part::Pictures);

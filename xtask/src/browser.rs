@@ -112,7 +112,7 @@ pub fn wasm_tests(browser: &Browser, cargo_args: &[&str]) -> Result<Command> {
     let runner = serde_json::json!([shell::wasm_test_runner()?.to_string_lossy()]);
     let config = format!("target.{}.runner={runner}", shell::WASM);
     let mut command = shell::cargo(["test", "--config", &config, "--target", shell::WASM]);
-    command.args(cargo_args).env("CHROMEDRIVER", &browser.driver);
+    shell::for_browsers(&mut command).args(cargo_args).env("CHROMEDRIVER", &browser.driver);
     command.env("WASM_BINDGEN_TEST_WEBDRIVER_JSON", capabilities(browser)?);
     command.envs([("WASM_BINDGEN_TEST_TIMEOUT", "300"), ("WASM_BINDGEN_TEST_DRIVER_TIMEOUT", "60")]);
     Ok(command)

@@ -26,11 +26,11 @@ copyright The Rust Project Contributors, under the MIT licence (https://www.rust
 /// A crate: its name with its version, and the licence in its manifest.
 type Crates = BTreeMap<String, String>;
 
-/// Writes the licences of all crates in modules with these sets of features into `folder`.
-pub fn write<'a>(folder: &Path, feature_sets: impl IntoIterator<Item = &'a str>) -> Result<()> {
+/// Writes the licences of all crates in the modules that are made of these packages into `folder`.
+pub fn write<'a>(folder: &Path, packages: impl IntoIterator<Item = &'a str>) -> Result<()> {
     let mut crates = Crates::new();
-    for features in feature_sets {
-        crates.extend(compiled(features)?);
+    for package in packages {
+        crates.extend(compiled(package)?);
     }
     for (name, licence) in &crates {
         check(name, licence)?;
@@ -40,23 +40,14 @@ pub fn write<'a>(folder: &Path, feature_sets: impl IntoIterator<Item = &'a str>)
 }
 
 /// The crates that a module contains: no build scripts and no procedural macros.
-fn compiled(features: &str) -> Result<Crates> {
-    let args = [
-        "tree",
-        "--package",
-        "tetralod",
-        "--target",
-        shell::WASM,
-        "--no-default-features",
-        "--prefix",
-        "none",
-    ];
+fn compiled(package: &str) -> Result<Crates> {
+    let args = ["tree", "--package", package, "--target", shell::WASM, "--prefix", "none"];
     let mut command = shell::cargo(args);
-    command.args(["--edges", "normal,no-proc-macro", "--format", "{p}|{l}", "--features", features]);
+    command.args(["--edges", "normal,no-proc-macro", "--format", "{p}|{l}"]);
     let tree = shell::output(&mut command)?;
     let rows = tree.lines().map(|line| line.trim_end_matches(" (*)"));
-    // The first row is the crate itself.
-    let rows = rows.filter(|row| !row.starts_with("tetralod "));
+    // Our own say themselves what they are under.
+    let rows = rows.filter(|row| !row.starts_with("tetralod"));
     rows.map(|row| {
         let (name, licence) = row.split_once('|').with_context(|| format!("cargo tree printed `{row}`"))?;
         Ok((name.replace(" v", " "), licence.to_owned()))
@@ -151,7 +142,7 @@ mod tests {
 
     #[test]
     fn every_crate_of_a_module_is_in_the_file() {
-        let crates = compiled("web-session").expect("cargo tree");
+        let crates = compiled("tetralod-web-core").expect("cargo tree");
         assert!(crates.keys().any(|name| name.starts_with("wasm-bindgen ")));
         assert!(!crates.keys().any(|name| name.starts_with("syn ")), "no procedural macros");
         let text = page(&crates, &sources().expect("cargo metadata")).expect("all licences can be read");

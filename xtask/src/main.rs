@@ -36,7 +36,7 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   build                          build the npm package into pkg/
-  build MODULE...                only some of its wasm modules: core, all_kinds, tools, viewer, build
+  build MODULE...                only some of its wasm modules: core, viewer, build
   demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
                                  volume is made in the background, unless with --small
   docs                           make the documentation's site in target/docs

@@ -1,10 +1,8 @@
-//! `cargo xtask build`: the five wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
+//! `cargo xtask build`: the three wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
 //! `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
 //!
-//! The core (decoder and refinement) for half-edge MTs, the same for MTs of all kinds, the tools for meshes (surfaces, probes,
-//! streamlines), the viewer (core and tools with the renderer) and the builder are separate modules, so that a page which draws by
-//! its own means does not download a renderer, one that only wants the mesh no tools, one that shows files no builder, and one
-//! that shows files as `tetralod build` makes them no other kinds of MT.
+//! The core (decoder, refinement, and the tools for meshes), the viewer (the same with the renderer) and the builder are separate
+//! modules, so that a page which draws by its own means does not download a renderer, and one that shows files no builder.
 
 use std::fs;
 use std::io::Write;
@@ -15,31 +13,31 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
-use crate::{licences, shell};
+use crate::{licences, release, shell};
 
 /// Where the package is put together.
 pub const PKG: &str = "pkg";
 
 struct Module {
+    /// Of the module and its script.
     name: &'static str,
-    /// The name of the JavaScript that it imports.
-    script: &'static str,
-    features: &'static str,
+    /// The crate that it is made of.
+    package: &'static str,
 }
 
-/// The core, and the same for MTs of all kinds.
-const CORES: [&str; 2] = ["tetralod_core", "tetralod_all_kinds"];
+const VIEWER: Module = Module { name: "tetralod_viewer", package: "tetralod-web-viewer" };
 
-const VIEWER: Module =
-    Module { name: "tetralod_viewer", script: "tetralod_viewer", features: "web,gpu,all-kinds" };
-
-const MODULES: [Module; 5] = [
-    Module { name: CORES[0], script: CORES[0], features: "web-session" },
-    Module { name: CORES[1], script: CORES[0], features: "web-session,all-kinds" },
-    Module { name: "tetralod_tools", script: "tetralod_tools", features: "web-tools" },
+const MODULES: [Module; 3] = [
+    Module { name: "tetralod_core", package: "tetralod-web-core" },
     VIEWER,
-    Module { name: "tetralod_build", script: "tetralod_build", features: "web-build" },
+    Module { name: "tetralod_build", package: "tetralod-web-build" },
 ];
+
+const BENCH: Module = Module { name: "tetralod_bench", package: "tetralod-web-bench" };
+
+/// All crates that are for browsers alone.
+pub const CRATES: [&str; 5] =
+    ["tetralod-web", MODULES[0].package, MODULES[1].package, MODULES[2].package, BENCH.package];
 
 /// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.
 const WASM_FEATURES: [&str; 6] = [
@@ -104,7 +102,6 @@ fn build_all(profile: Profile) -> Result<()> {
     let staging = Path::new("target/pkg-staging");
     remake(staging)?;
     compile_all(MODULES.iter(), profile, staging)?;
-    check_cores(staging)?;
     assemble(staging)?;
     fs::write(MADE, profile.cargo()[0]).context(MADE)
 }
@@ -144,8 +141,7 @@ pub fn ensure_built(profile: Profile) -> Result<()> {
 /// Compiles the module with the benchmark, which the package does not have, into `folder`.
 pub fn build_bench(folder: &Path) -> Result<()> {
     prepare()?;
-    let bench = Module { name: "tetralod_bench", script: "tetralod_bench", features: "web-bench,all-kinds" };
-    compile_all(std::iter::once(&bench), Profile::Released, folder)
+    compile_all(std::iter::once(&BENCH), Profile::Released, folder)
 }
 
 /// wasm-bindgen's macro and its generator of scripts speak a private protocol: they must be the same version.
@@ -183,35 +179,17 @@ fn compile_all<'a>(modules: impl Iterator<Item = &'a Module>, profile: Profile, 
 
 /// Compiles a module, which is not optimised then.
 fn compile(module: &Module, profile: Profile, out: &Path) -> Result<()> {
-    let Module { name, script, features } = module;
-    println!("building {name} ({features})");
+    let Module { name, package } = module;
+    println!("building {name}");
     let [profile, folder] = profile.cargo();
-    let args = ["build", "--package", "tetralod", "--lib", "--profile", profile, "--target", shell::WASM];
+    let args = ["build", "--package", package, "--lib", "--profile", profile, "--target", shell::WASM];
     let mut command = shell::cargo(args);
-    command.args(["--no-default-features", "--features", features, "--config", &rust_flags()?]);
-    shell::run(&mut command)?;
-    let wasm = Path::new("target").join(shell::WASM).join(folder).join("tetralod.wasm");
-    let made = out.join("made");
+    shell::run(shell::for_browsers(&mut command).args(["--config", &rust_flags()?]))?;
+    let wasm = format!("{}/{}/{folder}/{}.wasm", shell::FOR_BROWSERS, shell::WASM, package.replace('-', "_"));
     // As wasm-bindgen's command line has it: the script knows where its module is.
     let mut bindgen = Bindgen::new();
-    bindgen.web(true)?.input_path(&wasm).out_name(script).typescript(true);
-    bindgen.omit_default_module_path(false).generate(&made)?;
-    for file in files_of(&made)? {
-        fs::rename(made.join(&file), out.join(file.replacen(script, name, 1)))
-            .with_context(|| format!("moving {file}"))?;
-    }
-    fs::remove_dir(&made).with_context(|| made.display().to_string())
-}
-
-/// The option `wasmUrl` may lead to either core, so both must have the same script. It is there twice, since one that runs
-/// belongs to one module.
-fn check_cores(folder: &Path) -> Result<()> {
-    let [script, other] = CORES.map(|name| {
-        let path = folder.join(format!("{name}.js"));
-        fs::read(&path).with_context(|| path.display().to_string())
-    });
-    ensure!(script? == other?, "{} and {} differ in their imports or exports", CORES[0], CORES[1]);
-    Ok(())
+    bindgen.web(true)?.input_path(&wasm).out_name(name).typescript(true);
+    bindgen.omit_default_module_path(false).generate(out)
 }
 
 /// Panic messages name source files: the same bytes must come out on every machine, and no home folder in them. And what a module does
@@ -238,7 +216,7 @@ fn assemble(staging: &Path) -> Result<()> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(licence, staging.join(licence)).context(licence)?;
     }
-    licences::write(staging, MODULES.iter().map(|module| module.features))?;
+    licences::write(staging, MODULES.iter().map(|module| module.package))?;
     version()?;
     shell::run(shell::command("node", ["xtask/js/inline.mjs"]).arg(staging))?;
     let files = files_of(staging)?;
@@ -273,7 +251,7 @@ pub fn version() -> Result<String> {
     let json: serde_json::Value = serde_json::from_str(&text).context(path)?;
     let npm = json["version"].as_str().unwrap_or_default();
     let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;
-    for package in ["tetralod", "tetralod-cli"] {
+    for package in release::CRATES {
         let cargo = locked(&lock, package)?;
         ensure!(npm == cargo, "{path} is version {npm}, the crate {package} is {cargo}");
     }

@@ -10,7 +10,7 @@ use crate::shell;
 pub fn run(args: &[String]) -> Result<()> {
     ensure!(args.is_empty(), "`paper` takes no arguments, and finds data sets through TETRALOD_DATA");
     let start = Instant::now();
-    let args = ["run", "--release", "--package", "paper", "--features", "pictures", "--", "docs"];
+    let args = ["run", "--release", "--package", "paper", "--", "docs"];
     shell::run(&mut shell::cargo(args))?;
     println!("docs/paper.md is written; it took {:.0} s", start.elapsed().as_secs_f64());
     Ok(())

@@ -26,10 +26,13 @@ const COMPILED: &str = "target/planted/target";
 /// Says in the copy which fault is switched on, by its number.
 const SWITCH: &str = "TETRALOD_PLANTED_FAULT";
 
-/// Everything that tests of the library need.
-const FEATURES: &str = "tetralod/http,tetralod/vulkan,tetralod/web-bench,tetralod/parts";
+/// The crates that may have faults, whose tests find them.
+const PACKAGES: [&str; 4] = ["tetralod", "tetralod-build", "tetralod-io", "tetralod-render"];
 
-/// What the copy's `src/lib.rs` gets besides.
+/// Everything that their tests need.
+const FEATURES: &str = "tetralod/http,tetralod-io/hdf5";
+
+/// What the copy of each crate's `src/lib.rs` gets besides.
 const SWITCHES: &str = r#"
 pub(crate) fn planted_fault(number: u32) -> bool {
     static CHOSEN: std::sync::OnceLock<Option<u32>> = std::sync::OnceLock::new();
@@ -50,7 +53,7 @@ const TIMES_AS_LONG: u32 = 20;
 
 struct Fault {
     name: String,
-    /// In `src`.
+    /// Its path in the working tree.
     file: String,
     was: String,
     is: String,
@@ -63,7 +66,7 @@ enum Fate {
     Survives(String),
 }
 
-/// A test binary, `lib` for that of the unit tests, and the tests in it whose names contain this.
+/// A test binary, by the name of a crate for that of its unit tests, and the tests in it whose names contain this.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Test {
     binary: String,
@@ -144,9 +147,10 @@ fn copy_with(faults: &[Fault]) -> Result<()> {
     let files: BTreeSet<PathBuf> = listed.lines().map(PathBuf::from).filter(|path| path.is_file()).collect();
     for path in &files {
         let mut content = fs::read(path).with_context(|| path.display().to_string())?;
-        if let Ok(file) = path.strip_prefix("src") {
-            let source = String::from_utf8(content).with_context(|| path.display().to_string())?;
-            content = planted(&source, &file.to_string_lossy(), faults)?.into_bytes();
+        let name = path.to_string_lossy().replace('\\', "/");
+        if name.starts_with("src/") || name.starts_with("crates/") && name.ends_with(".rs") {
+            let source = String::from_utf8(content).with_context(|| name.clone())?;
+            content = planted(&source, &name, faults)?.into_bytes();
         }
         let copy = Path::new(TREE).join(path);
         if fs::read(&copy).ok().as_ref() != Some(&content) {
@@ -155,8 +159,8 @@ fn copy_with(faults: &[Fault]) -> Result<()> {
         }
     }
     let known: BTreeSet<&str> = faults.iter().map(|fault| fault.file.as_str()).collect();
-    let missing = known.into_iter().find(|file| !files.contains(&Path::new("src").join(file)));
-    ensure!(missing.is_none(), "there is no src/{}", missing.unwrap_or_default());
+    let missing = known.into_iter().find(|file| !files.contains(Path::new(file)));
+    ensure!(missing.is_none(), "there is no {}", missing.unwrap_or_default());
     remove_others(Path::new(TREE), Path::new(""), &files)
 }
 
@@ -179,7 +183,7 @@ fn planted(source: &str, file: &str, faults: &[Fault]) -> Result<String> {
     let mut places: Vec<(Range<usize>, usize)> = Vec::new();
     for (number, fault) in faults.iter().enumerate().filter(|(_, fault)| fault.file == file) {
         let [place] = &find(source, &fault.was)[..] else {
-            bail!("src/{file} must have this exactly once, for `{}`:\n  {}", fault.name, fault.was);
+            bail!("{file} must have this exactly once, for `{}`:\n  {}", fault.name, fault.was);
         };
         places.push((place.clone(), number));
     }
@@ -188,14 +192,14 @@ fn planted(source: &str, file: &str, faults: &[Fault]) -> Result<String> {
     let mut done = 0;
     for (place, number) in places {
         let Fault { name, is, .. } = &faults[number];
-        ensure!(place.start >= done, "src/{file}: `{name}` is in the midst of another fault");
+        ensure!(place.start >= done, "{file}: `{name}` is in the midst of another fault");
         let was = &source[place.clone()];
         text += &source[done..place.start];
         text += &format!("(if crate::planted_fault({number}) {{ {is} }} else {{ {was} }})");
         done = place.end;
     }
     text += &source[done..];
-    if file == "lib.rs" {
+    if file == "src/lib.rs" || file.ends_with("/src/lib.rs") {
         text += SWITCHES;
     }
     Ok(text)
@@ -226,15 +230,11 @@ fn end_of(source: &str, start: usize, words: &[&str]) -> Option<usize> {
 /// The test binaries that find faults, by name.
 fn compile(faults: &[Fault]) -> Result<BTreeMap<String, PathBuf>> {
     let needed: BTreeSet<&str> = faults.iter().filter_map(test_of).map(|test| test.binary.as_str()).collect();
-    let mut command = shell::cargo(["test", "--no-run", "--message-format=json", "--package", "tetralod"]);
-    command.args(["--features", FEATURES]);
-    for binary in needed {
-        if binary == "lib" {
-            command.arg("--lib")
-        } else {
-            command.args(["--test", binary])
-        };
-    }
+    let mut command = shell::cargo(["test", "--no-run", "--message-format=json", "--features", FEATURES]);
+    command.args(PACKAGES.iter().flat_map(|name| ["--package", name])).arg("--lib");
+    // Other names are those of crates.
+    command
+        .args(needed.iter().filter(|name| !name.starts_with("tetralod")).flat_map(|name| ["--test", name]));
     let compiled = shell::root().join(COMPILED);
     command.current_dir(TREE).env("CARGO_TARGET_DIR", compiled).env("CARGO_INCREMENTAL", "0");
     let messages = shell::output(command.stderr(Stdio::inherit()))?;
@@ -250,9 +250,7 @@ fn test_of(fault: &Fault) -> Option<&Test> {
 fn program(message: &Value) -> Option<(String, PathBuf)> {
     let path = message["executable"].as_str().filter(|_| message["profile"]["test"] == true)?;
     let target = &message["target"];
-    let is_test = target["kind"].as_array()?.iter().any(|kind| kind == "test");
-    let name = if is_test { target["name"].as_str()? } else { "lib" };
-    Some((name.to_owned(), path.into()))
+    Some((target["name"].as_str()?.to_owned(), path.into()))
 }
 
 /// A test that is not started yet, with limited memory.
@@ -330,7 +328,7 @@ mod tests {
         let names: BTreeSet<&str> = faults.iter().map(|fault| fault.name.as_str()).collect();
         assert_eq!(names.len(), faults.len(), "each has a name of its own");
         for file in faults.iter().map(|fault| &fault.file).collect::<BTreeSet<_>>() {
-            let source = fs::read_to_string(root.join("src").join(file)).expect(file);
+            let source = fs::read_to_string(root.join(file)).expect(file);
             if let Err(error) = planted(&source, file, &faults) {
                 panic!("{LIST}: {error}");
             }

@@ -17,9 +17,8 @@ pub fn run(args: &[String]) -> Result<()> {
     while Instant::now() < end {
         let seed = SystemTime::now().duration_since(UNIX_EPOCH)?.as_millis().to_string();
         println!("\n=== TETRALOD_SEED={seed}");
-        let tests =
-            ["test", "--package", "tetralod", "--no-default-features", "--features", "build", "--tests"];
-        shell::run(shell::cargo(tests).env("TETRALOD_SEED", &seed))
+        let mut tests = shell::cargo(["test", "--tests"]);
+        shell::run(tests.args(shell::ALL).env("TETRALOD_SEED", &seed))
             .with_context(|| format!("set TETRALOD_SEED={seed} to see this failure again"))?;
     }
     Ok(())

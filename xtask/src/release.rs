@@ -6,6 +6,10 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::{package, shell};
 
+/// What is published on crates.io.
+pub const CRATES: [&str; 6] =
+    ["tetralod", "tetralod-io", "tetralod-build", "tetralod-render", "tetralod-bench", "tetralod-cli"];
+
 /// Checks the version and what would be uploaded; with a tag, such as `v0.1.0`, also that it names this version.
 pub fn run(args: &[String]) -> Result<()> {
     let version = package::version()?;
@@ -18,16 +22,9 @@ pub fn run(args: &[String]) -> Result<()> {
         _ => bail!("`release` takes one tag, got {}", args.join(" ")),
     }
     package::build(&[])?;
-    // One of these needs the other, which is not on crates.io yet: cargo takes it from here.
-    shell::run(&mut shell::cargo([
-        "publish",
-        "--dry-run",
-        "--locked",
-        "--package",
-        "tetralod",
-        "--package",
-        "tetralod-cli",
-    ]))?;
+    // They need each other, which are not on crates.io yet: cargo takes them from here.
+    let mut publish = shell::cargo(["publish", "--dry-run", "--locked"]);
+    shell::run(publish.args(CRATES.iter().flat_map(|name| ["--package", name])))?;
     shell::run(shell::npm(["publish", "--dry-run", "--access", "public"]).current_dir(package::PKG))
 }
 

@@ -69,13 +69,17 @@ pub fn find(program: &str) -> Option<PathBuf> {
     std::env::split_paths(&path).map(|folder| folder.join(program)).find(|file| file.is_file())
 }
 
-/// Everything native but this program, whose dependencies it was compiled with already, with every feature.
-pub const ALL: [&str; 5] = [
+/// Everything native but this program and what it runs, whose dependencies it was compiled with already, with every feature.
+pub const ALL: [&str; 9] = [
     "--workspace",
     "--exclude",
     "xtask",
+    "--exclude",
+    "wasm-test-runner",
+    "--exclude",
+    "tetralod-web-*",
     "--features",
-    "tetralod/http,tetralod/vulkan,tetralod/web-bench,paper/pictures",
+    "tetralod/http,tetralod-io/hdf5",
 ];
 
 /// The native command as it was compiled for the tests, optimised and with every assertion.
@@ -85,11 +89,10 @@ pub fn tested_command() -> Result<PathBuf> {
     Ok(built_in("debug"))
 }
 
-/// The native command without what takes long to compile and no volume of the demo needs: pictures, HDF5, addresses. In a folder of
-/// its own, so that files which it has made are older than the command only where it has changed.
+/// The native command in a folder of its own, so that files which it has made are older than the command only where it has changed.
 pub fn demo_command() -> Result<PathBuf> {
     // What incremental compilation prepares for the next time takes longer the first time, and somebody waits for the page.
-    let mut command = cargo(["build", "--package", "tetralod-cli", "--no-default-features"]);
+    let mut command = cargo(["build", "--package", "tetralod-cli"]);
     run(command.env("CARGO_INCREMENTAL", "0"))?;
     let (made, kept) = (built_in("debug"), built_in("demo"));
     let bytes = fs::read(&made).with_context(|| made.display().to_string())?;
@@ -106,10 +109,18 @@ pub fn released_command() -> Result<PathBuf> {
     Ok(built_in("release"))
 }
 
+/// What is compiled for browsers has a folder of its own: so it can be compiled beside what is native.
+pub const FOR_BROWSERS: &str = "target/browsers";
+
+/// Lets `command` compile for browsers.
+pub fn for_browsers(command: &mut Command) -> &mut Command {
+    command.env("CARGO_TARGET_DIR", root().join(FOR_BROWSERS))
+}
+
 /// The program that cargo calls for each file of wasm tests.
 pub fn wasm_test_runner() -> Result<PathBuf> {
     let name = "wasm-test-runner";
-    run(&mut cargo(["build", "--package", "xtask", "--features", "wasm-tests", "--bin", name]))?;
+    run(&mut cargo(["build", "--package", name]))?;
     Ok(program_in("debug", name))
 }
 

@@ -1,56 +1,72 @@
-//! `cargo xtask test`: every check there is, in order of cost; but the npm package is built beside the native tests. Each step
-//! prints a header and its time; the first that fails ends the run. Nothing is left out because something is missing on the machine, but for the tests of
-//! real data where `TETRALOD_DATA` names none: cargo counts these as ignored.
+//! `cargo xtask test`: every check there is. Steps that need nothing of each other run side by side, each as a program of its own, whose
+//! output is shown when it ends; the first that fails ends the run once those that run have ended. Nothing is left out because something is
+//! missing on the machine, but for the tests of real data where `TETRALOD_DATA` names none: cargo counts these as ignored.
 //!
-//! A feature set of its own compiles the crate and what it needs again. So lints, documentation, tests and the command that
-//! makes the tests' data share one ([`shell::ALL`]); further ones are only linted, and only where a mistake would not show in it.
+//! Natively everything is compiled with one set of features ([`shell::ALL`]) and in the profile of the tests, for browsers likewise.
 
+use std::fs::{self, File};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Child, Command};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::{browser, demo, docs, fixture, package, shell, workflows};
 
 struct Step {
     name: &'static str,
     what: &'static str,
+    /// The steps that must have passed before, where they are asked for at all: what they make is made by this step, too, if it is not there.
+    after: &'static [&'static str],
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 14] = [
-    Step { name: "fmt", what: "formatting", run: fmt },
-    Step { name: "clippy", what: "lints of everything native", run: clippy },
-    Step { name: "features", what: "lints of the feature sets that are shipped", run: features },
-    Step { name: "doc", what: "documentation without broken links", run: doc },
-    Step { name: "native", what: "unit, integration and documentation tests", run: native },
-    Step { name: "workflows", what: "building in parts, with a process killed", run: workflows::test },
-    Step { name: "package", what: "the npm package, compiled as the tests are", run: npm_package },
-    Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
-    Step { name: "js", what: "lints and types of all JavaScript, and the package in Node", run: js },
-    Step { name: "consumer", what: "installing and type-checking the packed package", run: consumer },
-    Step {
-        name: "site",
-        what: "the documentation's site: its links, and that it needs no network",
-        run: site,
-    },
-    Step { name: "pages", what: "the examples of README.md and docs/ in Node and Chromium", run: pages },
-    Step { name: "examples", what: "building the example projects, and their pictures", run: examples },
-    Step { name: "e2e", what: "the package and the demo page in headless browsers", run: e2e },
+const fn step(
+    name: &'static str,
+    what: &'static str,
+    after: &'static [&'static str],
+    run: fn() -> Result<()>,
+) -> Step {
+    Step { name, what, after, run }
+}
+
+/// Those that take long, or that others wait for, come first.
+const STEPS: [Step; 15] = [
+    step("fmt", "formatting", &[], fmt),
+    step(
+        "compile",
+        "the native tests and the command, and small MTs that it makes for other steps",
+        &[],
+        compile,
+    ),
+    step("package", "the npm package, compiled as the tests are", &[], npm_package),
+    step("native", "unit, integration and documentation tests", &["compile"], native),
+    step("e2e", "the package and the demo page in headless browsers", &["compile", "package"], e2e),
+    step("clippy", "lints of everything native", &["compile"], clippy),
+    step("lint-wasm", "lints of everything for browsers", &["package"], lint_wasm),
+    step("wasm", "the core and a WebGPU adapter in headless Chromium", &["compile"], wasm),
+    step("js", "lints and types of all JavaScript, and the package in Node", &["compile", "package"], js),
+    step("workflows", "building in parts, with a process killed", &["compile"], workflows::test),
+    step("doc", "documentation without broken links", &["compile"], doc),
+    step("consumer", "installing and type-checking the packed package", &["compile", "package"], consumer),
+    step("site", "the documentation's site: its links, and that it needs no network", &["package"], site),
+    step("pages", "the examples of README.md and docs/ in Node and Chromium", &["compile", "package"], pages),
+    step("examples", "building the example projects, and their pictures", &["compile", "package"], examples),
 ];
 
 /// What `--quick` runs.
 const QUICK: [Step; 3] = [
-    Step { name: "fmt", what: "formatting", run: fmt },
-    Step { name: "clippy", what: "lints of everything native", run: clippy },
-    Step {
-        name: "quick",
-        what: "unit and integration tests, without the longest ones and without real data",
-        run: quick,
-    },
+    step("fmt", "formatting", &[], fmt),
+    step("clippy", "lints of everything native", &[], clippy),
+    step("quick", "unit and integration tests, without the longest ones and without real data", &[], quick),
 ];
+
+/// So many steps run at a time: each uses more than one core now and then, and none all the time.
+const AT_A_TIME: usize = 2;
+
+/// What the steps wrote.
+const OUTPUT: &str = "target/test-output";
 
 /// Runs the steps named in `args`, or all, or with `--quick` those few that find most mistakes.
 pub fn run(args: &[String]) -> Result<()> {
@@ -59,49 +75,89 @@ pub fn run(args: &[String]) -> Result<()> {
         return Ok(());
     }
     if args == ["--quick"] {
-        return run_all(QUICK.iter());
+        return QUICK.iter().try_for_each(run_here);
     }
     if let Some(unknown) = args.iter().find(|name| STEPS.iter().all(|step| step.name != name.as_str())) {
-        anyhow::bail!("there is no step `{unknown}`; `cargo xtask test --list` names them");
+        bail!("there is no step `{unknown}`; `cargo xtask test --list` names them");
     }
-    run_all(STEPS.iter().filter(|step| args.is_empty() || args.iter().any(|name| name == step.name)))
+    let chosen: Vec<&Step> =
+        STEPS.iter().filter(|step| args.is_empty() || args.iter().any(|name| name == step.name)).collect();
+    match chosen[..] {
+        [step] => run_here(step),
+        _ => run_side_by_side(chosen),
+    }
 }
 
-fn run_all<'a>(steps: impl Iterator<Item = &'a Step>) -> Result<()> {
-    let steps: Vec<_> = steps.collect();
-    let mut times = Vec::new();
-    let mut package = None;
-    for step in &steps {
-        println!("\n=== {}: {}", step.name, step.what);
-        let start = Instant::now();
-        if step.name == "native" && steps.iter().any(|later| later.name == "package") {
-            // Its modules are linked on one core each, and so end the last of the tests.
-            println!("(the npm package is built meanwhile)");
-            package = Some(thread::spawn(npm_package));
+fn run_here(step: &Step) -> Result<()> {
+    println!("\n=== {}: {}", step.name, step.what);
+    (step.run)().with_context(|| format!("step `{}` failed", step.name))
+}
+
+/// A step that runs.
+struct Running {
+    step: &'static Step,
+    child: Child,
+    start: Instant,
+}
+
+fn run_side_by_side(mut waiting: Vec<&'static Step>) -> Result<()> {
+    fs::create_dir_all(OUTPUT)?;
+    let start = Instant::now();
+    let (mut running, mut times, mut failed) = (Vec::new(), Vec::new(), None);
+    while !running.is_empty() || failed.is_none() && !waiting.is_empty() {
+        while failed.is_none() && running.len() < AT_A_TIME {
+            let is_ahead = |name: &&str| {
+                waiting.iter().any(|step| step.name == *name)
+                    || running.iter().any(|one: &Running| one.step.name == *name)
+            };
+            let Some(next) = waiting.iter().position(|step| !step.after.iter().any(is_ahead)) else { break };
+            running.push(started(waiting.remove(next))?);
         }
-        let built = if step.name == "package" { package.take() } else { None };
-        let done = match built {
-            Some(built) => built.join().map_err(|_| anyhow!("its thread panicked")).flatten(),
-            None => (step.run)(),
-        };
-        if let Err(error) = done {
-            // Nothing is left running.
-            let _ = package.map(thread::JoinHandle::join);
-            return Err(error.context(format!("step `{}` failed", step.name)));
+        thread::sleep(Duration::from_millis(200));
+        let mut going_on = Vec::new();
+        for mut one in running {
+            match one.child.try_wait()? {
+                None => going_on.push(one),
+                Some(status) => {
+                    times.push((one.step.name, one.start.elapsed()));
+                    show(&one)?;
+                    if !status.success() {
+                        failed.get_or_insert(one.step.name);
+                    }
+                }
+            }
         }
-        println!("--- {}: {:.1} s", step.name, start.elapsed().as_secs_f64());
-        times.push((step.name, start.elapsed()));
+        running = going_on;
     }
-    summarise(&times);
+    if let Some(name) = failed {
+        bail!("step `{name}` failed: see above, or {OUTPUT}/{name}.txt");
+    }
+    summarise(&times, start.elapsed());
     Ok(())
 }
 
-fn summarise(times: &[(&str, Duration)]) {
+fn started(step: &'static Step) -> Result<Running> {
+    println!("... {}: {}", step.name, step.what);
+    let output = File::create(format!("{OUTPUT}/{}.txt", step.name))?;
+    let mut command = Command::new(std::env::current_exe()?);
+    command.args(["test", step.name]).stdout(output.try_clone()?).stderr(output);
+    Ok(Running { step, child: command.spawn()?, start: Instant::now() })
+}
+
+/// Prints what a step wrote that has ended.
+fn show(one: &Running) -> Result<()> {
+    let written = fs::read(format!("{OUTPUT}/{}.txt", one.step.name))?;
+    println!("{}", String::from_utf8_lossy(&written).trim_end());
+    println!("--- {}: {:.1} s", one.step.name, one.start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn summarise(times: &[(&str, Duration)], total: Duration) {
     println!("\nall {} steps passed", times.len());
     for (name, time) in times {
         println!("{name:<10} {:>7.1} s", time.as_secs_f64());
     }
-    println!("{:<10} {:>7.1} s", "total", times.iter().map(|(_, time)| time.as_secs_f64()).sum::<f64>());
+    println!("{:<10} {:>7.1} s, {AT_A_TIME} steps at a time", "total", total.as_secs_f64());
 }
 
 fn fmt() -> Result<()> {
@@ -111,29 +167,17 @@ fn fmt() -> Result<()> {
 fn clippy() -> Result<()> {
     let mut command = shell::cargo(["clippy", "--all-targets"]);
     shell::run(command.args(shell::ALL).args(["--", "-D", "warnings"]))?;
-    let mut command = shell::cargo(["clippy", "--package", "xtask", "--all-features", "--all-targets"]);
-    shell::run(command.args(["--", "-D", "warnings"]))
+    let own = ["clippy", "--package", "xtask", "--package", "wasm-test-runner", "--all-targets"];
+    shell::run(shell::cargo(own).args(["--", "-D", "warnings"]))
 }
 
-/// The core alone, which must not need any feature; with the builders, as `paper` has it; the command as the demo makes it; and of the
-/// package the builder, and all else with the tests in the browser. That each of its modules has no code which it does not need is for the
-/// package's own build, which takes no warnings.
-fn features() -> Result<()> {
-    lint_library("", &[])?;
-    lint_library("build", &[])?;
-    let command = ["clippy", "--package", "tetralod-cli", "--no-default-features", "--", "-D", "warnings"];
-    shell::run(&mut shell::cargo(command))?;
+fn lint_wasm() -> Result<()> {
     shell::add_wasm_target()?;
-    lint_library("web-build", &["--target", shell::WASM])?;
     with_fixture(|| {
-        let args = ["clippy", "--package", "tetralod", "--lib", "--test", "web", "--target", shell::WASM];
-        shell::run(fixture_env(shell::cargo(args).args(WEB_FEATURES).args(["--", "-D", "warnings"])))
+        let mut command = shell::cargo(["clippy", "--all-targets", "--target", shell::WASM]);
+        shell::for_browsers(&mut command).args(package::CRATES.iter().flat_map(|name| ["--package", name]));
+        shell::run(fixture_env(command.args(["--", "-D", "warnings"])))
     })
-}
-
-fn lint_library(features: &str, target: &[&str]) -> Result<()> {
-    let mut command = shell::cargo(["clippy", "--package", "tetralod", "--lib", "--no-default-features"]);
-    shell::run(command.args(["--features", features]).args(target).args(["--", "-D", "warnings"]))
 }
 
 fn doc() -> Result<()> {
@@ -169,18 +213,21 @@ fn quick() -> Result<()> {
     shell::run(command.args(LONG.iter().flat_map(|name| ["--skip", name])))
 }
 
+/// All that later steps run or read.
+fn compile() -> Result<()> {
+    with_fixture(|| Ok(()))
+}
+
 fn npm_package() -> Result<()> {
     package::build_for_tests()
 }
-
-const WEB_FEATURES: [&str; 3] = ["--no-default-features", "--features", "web-bench,gpu,all-kinds"];
 
 fn wasm() -> Result<()> {
     let browser = browser::require()?;
     shell::add_wasm_target()?;
     with_fixture(|| {
-        let mut command = browser::wasm_tests(&browser, &["--package", "tetralod", "--test", "web"])?;
-        shell::run(fixture_env(command.args(WEB_FEATURES)))
+        let tests = ["--package", "tetralod-web-core", "--package", "tetralod-web-viewer", "--tests"];
+        shell::run(fixture_env(&mut browser::wasm_tests(&browser, &tests)?))
     })
 }
 
@@ -259,16 +306,8 @@ fn consumer() -> Result<()> {
     ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
     shell::run(&mut node_tool("publint/src/cli.js", &["--strict", package::PKG]))?;
     // The files that are no modules have no types; the scripts of workers export nothing.
-    let untyped = [
-        "--profile",
-        "esm-only",
-        "--exclude-entrypoints",
-        "core.wasm",
-        "all-kinds.wasm",
-        "tools.wasm",
-        "viewer.wasm",
-        "build.wasm",
-    ];
+    let untyped =
+        ["--profile", "esm-only", "--exclude-entrypoints", "core.wasm", "viewer.wasm", "build.wasm"];
     shell::run(
         node_tool("@arethetypeswrong/cli/dist/index.js", &["--format", "table-flipped", "--no-emoji"])
             .args(["--no-color", "--quiet"])

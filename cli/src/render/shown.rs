@@ -10,9 +10,11 @@ use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 use tetralod::geom::Bounds;
 use tetralod::mt::FieldInfo;
-use tetralod::scene::{Background, CellKind, IsosurfaceState, MapName, PlaneState, SceneState, SliceState};
 use tetralod::session::TetQuantity;
 use tetralod::view::Plane;
+use tetralod_render::scene::{
+    Background, CellKind, IsosurfaceState, MapName, PlaneState, SceneState, SliceState,
+};
 
 const SHOWN: &str = "What is shown";
 const COLOURS: &str = "Colours";

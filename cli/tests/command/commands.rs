@@ -463,7 +463,7 @@ fn points_alone_are_inserted() {
     let [xml, vertices, poly, mt, other, out] =
         ["p.vtu", "v.vtk", "p.vtk", "p.mt", "o.mt", "o.vtu"].map(|name| folder.path(name));
     let ball = ball(700);
-    tetralod::io::write_vtu(&ball, &mut fs::File::create(&xml).expect("a file")).expect("it is written");
+    tetralod_io::write_vtu(&ball, &mut fs::File::create(&xml).expect("a file")).expect("it is written");
     let all: String = (0..700).map(|i| format!(" {i}")).collect();
     let one: String = (0..700).map(|i| format!("1 {i}\n")).collect();
     let cells = format!("CELLS 700 1400\n{one}CELL_TYPES 700\n{}", "1\n".repeat(700));
@@ -836,10 +836,10 @@ fn measuring_against_another_mesh_fails() {
     let folder = Folder::new("another");
     let [input, other, mt, out] = ["in.vti", "other.vtu", "m.mt", "out.vtu"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "9", "-o", &input]);
-    let mut mesh = tetralod::io::read(Path::new(&input)).expect("a mesh");
+    let mut mesh = tetralod_io::read(Path::new(&input)).expect("a mesh");
     mesh.fields[0].values.iter_mut().for_each(|value| *value = 1.0 - *value);
     let mut file = fs::File::create(&other).expect("a file");
-    tetralod::io::write_vtu(&mesh, &mut file).expect("it is written");
+    tetralod_io::write_vtu(&mesh, &mut file).expect("it is written");
     drop(file);
     good(&["build", &input, "-o", &mt, "--quiet"]);
     for error in ["0", "1%", "20%"] {
@@ -871,7 +871,7 @@ fn values_are_fitted_to_the_input() {
     assert!((number(fit, "largest_before") - number(&own, "measured_error")).abs() < 1e-9, "{report}");
     // How much less it is depends on the mesh; `cargo xtask bench --against-vtk` measures that.
     assert!(number(fit, "root_mean_square") < 0.95 * number(fit, "root_mean_square_before"), "{report}");
-    let [a, b] = [&out, &fitted].map(|path| tetralod::io::read(Path::new(path)).expect("a mesh"));
+    let [a, b] = [&out, &fitted].map(|path| tetralod_io::read(Path::new(path)).expect("a mesh"));
     assert_eq!((&a.positions, &a.tets), (&b.positions, &b.tets));
     assert_ne!(a.fields[0].values, b.fields[0].values);
     let told = good(&["extract", &mt, "--budget", "500", "-o", &fitted, "--fit", &input]);

@@ -3,8 +3,8 @@
 use crate::support::{Folder, bad, command, good, json, number, run, text};
 use std::fs;
 use std::fs::File;
-use tetralod::io;
 use tetralod::mesh::{Field, Grid, TetMesh, VectorPart};
+use tetralod_io as io;
 
 /// Cubes with a scalar and a vector that depend on the time.
 fn step(time: Option<f64>, factor: f64) -> TetMesh {
@@ -90,7 +90,7 @@ fn times(path: &str) -> Vec<(String, f64)> {
 fn a_file_with_several_time_steps_gives_all_or_one() {
     let folder = Folder::new("steps-in-a-file");
     let mt = folder.path("a.mt");
-    let input = format!("{}/../tests/data/steps.vtkhdf", env!("CARGO_MANIFEST_DIR"));
+    let input = format!("{}/../crates/io/tests/data/steps.vtkhdf", env!("CARGO_MANIFEST_DIR"));
     for (more, expected) in [(&[][..], &[0.0, 0.5, 2.0][..]), (&["--step", "1"], &[0.5])] {
         good(&[&["build", &input, "-o", &mt, "--quiet"], more].concat());
         let expected: Vec<_> = expected.iter().map(|time| ("p".to_owned(), *time)).collect();

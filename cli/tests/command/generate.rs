@@ -3,8 +3,8 @@
 use crate::support::{Folder, bad, command, good, json, number};
 use std::fs;
 use std::path::Path;
-use tetralod::generate::VOLUMES;
-use tetralod::io::{read, steps};
+use tetralod_io::generate::VOLUMES;
+use tetralod_io::{read, steps};
 
 #[test]
 fn every_volume_that_is_listed_is_built() {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-use tetralod::io::read;
+use tetralod_io::read;
 use zip::ZipArchive;
 
 /// An array: its type and shape as NumPy writes them, and its bytes.

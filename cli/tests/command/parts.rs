@@ -7,8 +7,8 @@ use crate::support::{Folder, bad, good, json, run, text};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use tetralod::io;
 use tetralod::mesh::{Field, TetMesh};
+use tetralod_io as io;
 
 /// `generate`d samples, one value each.
 fn generate(folder: &Folder, size: &str) -> String {

@@ -2,8 +2,8 @@
 
 use crate::support::{Folder, bad, good, json, run, text};
 use std::fs::File;
-use tetralod::io;
 use tetralod::mesh::{Field, Grid, TetMesh};
+use tetralod_io as io;
 
 /// Two cubes of six tetrahedra that touch at x = 1, each with points of its own, `gap` apart.
 fn write_blocks(path: &str, gap: f64, change: impl Fn(&mut TetMesh)) {

@@ -19,7 +19,7 @@ fn box_mt(folder: &Folder) -> String {
     field("v_y", |[x, _, _]| x - 1.0);
     field("v_z", |_| 0.0);
     let [input, mt] = ["box.vti", "box.mt"].map(|name| folder.path(name));
-    tetralod::io::write_vti(&mesh, &mut fs::File::create(&input).expect("a file")).expect("it is written");
+    tetralod_io::write_vti(&mesh, &mut fs::File::create(&input).expect("a file")).expect("it is written");
     let fields = ["ramp", "hill", "v_x", "v_y", "v_z"].map(|name| ["--field", name]).concat();
     good(&[&["build", &input, "-o", &mt, "--quiet"], &fields[..]].concat());
     mt

@@ -81,9 +81,6 @@ pub fn write_info(
 pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatError> {
     let kind = KINDS.get(usize::from(reader.u8()?)).copied();
     let kind = kind.ok_or_else(|| reader.corrupt("the kind of MT is not known"))?;
-    if !kind.is_built_in() {
-        return Err(FormatError::Kind { kind });
-    }
     let [vertices, tetrahedra, updates] = [reader.u32()?, reader.u32()?, reader.u32()?];
     let lattice = Lattice { origin: reader.f64x3()?, step: reader.f64x3()?, bits: u32::from(reader.u8()?) };
     let displacement_per_error = reader.f64()?;

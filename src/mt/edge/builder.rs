@@ -3,13 +3,11 @@
 use super::predict::Link;
 use super::star::take_ring;
 use crate::mt::mesh::stars::Gather;
-#[cfg(feature = "build")]
 use crate::mt::mesh::stars::Star;
 use crate::mt::{
     Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, EdgeUpdate, MAX_LINK, MtInfo,
     MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexSplit,
 };
-#[cfg(feature = "build")]
 use crate::mt::{MAX_STAR, VertexId};
 use std::borrow::Cow;
 
@@ -51,7 +49,8 @@ impl EdgeMtBuilder {
     }
 
     /// [`Self::push`] that shows the MT with the update, and the mesh just before it is applied.
-    pub(crate) fn push_seen(
+    #[doc(hidden)]
+    pub fn push_seen(
         &mut self,
         split: &VertexSplit<'_>,
         see: impl FnOnce(&EdgeMt, &mut CurrentMesh, UpdateId) -> Result<(), UpdateError>,
@@ -69,8 +68,8 @@ impl EdgeMtBuilder {
         Ok(u)
     }
 
-    #[cfg(feature = "build")]
-    pub(crate) fn mesh(&mut self) -> &mut CurrentMesh {
+    #[doc(hidden)]
+    pub fn mesh(&mut self) -> &mut CurrentMesh {
         &mut self.mesh
     }
 }
@@ -111,11 +110,11 @@ fn to_residuals<'a>(
     Ok(EdgeUpdate { level_residuals: Cow::Borrowed(residuals), ..stored? })
 }
 
-#[cfg(feature = "build")]
 impl CurrentMesh {
     /// Brings the mask of a split from the order of other vertex numbers, which `other` gives, to that of the MT's.
     /// The two sides change places if they `turn`. None if the vertex is not in the mesh or its star is too large.
-    pub(crate) fn reorder_mask(
+    #[doc(hidden)]
+    pub fn reorder_mask(
         &mut self,
         vertex: VertexId,
         mask: u64,

@@ -16,7 +16,6 @@
 //! `mt/edge/predict.rs`. [`EdgeMtBuilder`](crate::mt::EdgeMtBuilder) makes them from plain vertex splits.
 
 use crate::mesh::NONE;
-use crate::mt::other_kinds::OtherKind;
 use crate::mt::pages::{Page, Pages};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
@@ -88,7 +87,6 @@ pub struct EdgeMt {
     base_splits: Vec<i32>,
     pub(super) pages: Pages<EdgePage>,
     pub(super) record: Record,
-    kind: OtherKind,
 }
 
 /// Updates that come and go together, each with all that belongs to it side by side.
@@ -226,7 +224,6 @@ impl EdgeMt {
             pages: Pages::new(info.updates, bits),
             record: Record::new(&info),
             info,
-            kind: OtherKind::new(),
         }
     }
 

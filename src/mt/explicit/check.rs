@@ -2,15 +2,10 @@
 
 use super::face_occupancy::{Faces, faces};
 use crate::geom::orient3d;
-#[cfg(feature = "build")]
 use crate::mt::Applied;
-#[cfg(feature = "build")]
 use crate::mt::ApplyUpdates;
-#[cfg(feature = "build")]
 use crate::mt::ReplayError;
-#[cfg(feature = "build")]
 use crate::mt::UpdateError;
-#[cfg(feature = "build")]
 use crate::mt::margins::Margins;
 use crate::mt::{ExplicitMt, MultiTessellation, UpdateId, VertexId};
 use std::collections::BTreeSet;
@@ -82,7 +77,6 @@ impl std::error::Error for MtFault {}
 ///
 /// # Errors
 /// If an update cannot be applied.
-#[cfg(feature = "build")]
 pub fn check_errors(mt: &impl ApplyUpdates) -> Result<Option<MtFault>, ReplayError> {
     let mut mesh = mt.start()?;
     mt.updates_arrived(&mut mesh, 0);

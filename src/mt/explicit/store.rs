@@ -9,7 +9,6 @@
 
 use crate::geom::orient3d;
 use crate::mesh::NONE;
-use crate::mt::other_kinds::OtherKind;
 use crate::mt::pages::Rows;
 use crate::mt::replay::{ReplayError, canonical, replay};
 use crate::mt::update_errors::Errors;
@@ -64,7 +63,6 @@ pub struct ExplicitMt {
     pub(in crate::mt) always_grows: bool,
     /// See [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
     pub(super) page_bits: u32,
-    kind: OtherKind,
 }
 
 /// What an explicit MT consists of, in numbers.
@@ -115,7 +113,6 @@ impl ExplicitMt {
             always_grows: true,
             base,
             page_bits: MtKind::Explicit.usual_block_bits(),
-            kind: OtherKind::new(),
         }
     }
 

@@ -32,13 +32,15 @@ pub(super) fn damaged(error: UpdateError) -> ConvertError {
 pub(crate) type Remover = (u32, u8);
 
 /// Bits of the vertices of a tetrahedron in ascending order, by its corners.
-pub(crate) fn by_corner(bits: u8, tet: [u32; 4]) -> u8 {
+#[doc(hidden)]
+pub fn by_corner(bits: u8, tet: [u32; 4]) -> u8 {
     let rank = |v: u32| tet.iter().filter(|&&other| other < v).count();
     (0..4).fold(0, |all, corner| all | (bits >> rank(tet[corner]) & 1) << corner)
 }
 
 /// The updates by near vertex.
-pub(crate) struct Forest {
+#[doc(hidden)]
+pub struct Forest {
     /// Where those of each vertex begin, and one more.
     starts: Vec<u32>,
     children: Vec<ForestChild>,
@@ -81,7 +83,8 @@ impl Forest {
 }
 
 /// The next update.
-pub(crate) struct NextUpdate<'a> {
+#[doc(hidden)]
+pub struct NextUpdate<'a> {
     /// The levels of the new vertex.
     pub levels: &'a [i32],
     pub errors: &'a [ErrorCode],
@@ -91,7 +94,8 @@ pub(crate) struct NextUpdate<'a> {
 }
 
 /// A half-edge MT that grows.
-pub(crate) struct HalfEdgeBuilder {
+#[doc(hidden)]
+pub struct HalfEdgeBuilder {
     mt: HalfEdgeMt,
     forest: Forest,
     names: Vec<u32>,

@@ -55,8 +55,8 @@ pub struct MeshChanges {
 
 impl MeshChanges {
     /// Every vertex has changed, no tetrahedron has.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn of_all_vertices(count: usize) -> Self {
+    #[doc(hidden)]
+    pub fn of_all_vertices(count: usize) -> Self {
         Self { vertices: std::iter::once(0..count as u32).collect(), tets: Vec::new() }
     }
 }
@@ -681,7 +681,8 @@ impl CurrentMesh {
 
 /// A finaliser that spreads every input bit over the word (the constants are those of SplitMix64).
 #[inline]
-pub(crate) fn mix(x: u64) -> u64 {
+#[doc(hidden)]
+pub fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);

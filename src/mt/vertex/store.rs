@@ -31,7 +31,6 @@ use super::growing::Growing;
 use super::limits::{COUNT_BITS, MAX_INSERTED, MAX_REMOVED};
 use super::tet_errors::MAX_QUARTERINGS;
 use crate::mesh::NONE;
-use crate::mt::other_kinds::OtherKind;
 use crate::mt::update_errors::Errors;
 use crate::mt::{BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId};
 
@@ -82,7 +81,6 @@ pub struct VertexMt {
     pub(in crate::mt) growing: Option<Box<Growing>>,
     /// See [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
     pub(super) page_bits: u32,
-    kind: OtherKind,
 }
 
 /// Nodes whose starts are relative to a common one: with at most 255 fields a node takes less than 2^14 bits.
@@ -146,7 +144,6 @@ impl VertexMt {
             shape_bits: 0,
             growing: None,
             page_bits: MtKind::Vertex.usual_block_bits(),
-            kind: OtherKind::new(),
         })
     }
 

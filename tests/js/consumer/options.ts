@@ -92,7 +92,6 @@ const openings: Examples<OpenOptions> = {
   workerUrl: { workerUrl: import.meta.resolve("tetralod/worker") },
   workerTimeoutMs: { workerTimeoutMs: 60_000 },
   wasmUrl: { wasmUrl: new URL(import.meta.resolve("tetralod/core.wasm")) },
-  toolsUrl: { toolsUrl: new URL(import.meta.resolve("tetralod/tools.wasm")) },
 };
 
 /** The members that a result has by its type, each with the kinds of value that it may have. */

@@ -9,12 +9,12 @@ use crate::support::oracle::sorted;
 use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, EdgeMt, ExplicitMt, ExplicitUpdate, HalfEdgeMt, Mt, MtKind, MultiTessellation,
     UpdateId, UpdatePages, VertexId, VertexMt, stats,
 };
+use tetralod_build::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 
 /// A kind of MT and how it is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

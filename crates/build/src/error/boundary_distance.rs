@@ -1,0 +1,108 @@
+//! The boundary of the reference mesh, and how far a point is from it.
+
+use crate::geometry::triangle_fan::TriangleFan;
+use foldhash::HashMap;
+use glam::DVec3;
+use tetralod::geom::{Groups, nearest_on_triangle};
+use tetralod::mesh::boundary_faces;
+
+/// Of vertices with more triangles than this not all are looked at.
+const MANY: usize = 64;
+
+/// The boundary triangles of the reference mesh, in model units.
+pub(crate) struct BoundaryDistance {
+    triangles: Vec<[DVec3; 3]>,
+    corners: Vec<[u32; 3]>,
+    /// The triangles at each vertex.
+    around: Groups,
+    /// Those at the vertices with [`MANY`].
+    fans: HashMap<u32, TriangleFan>,
+    /// How many triangles were compared with a point.
+    #[cfg(test)]
+    pub compared: std::sync::atomic::AtomicU64,
+}
+
+impl BoundaryDistance {
+    /// Of the triangles without a neighbour.
+    pub fn new(tets: &[[u32; 4]], neighbors: &[[u32; 4]], positions: &[DVec3]) -> Self {
+        Self::of(boundary_faces(tets, neighbors).map(|(_, face)| face).collect(), positions)
+    }
+
+    /// Of these triangles, counter-clockwise when seen from outside.
+    pub fn of(corners: Vec<[u32; 3]>, positions: &[DVec3]) -> Self {
+        let triangles: Vec<_> = corners.iter().map(|face| face.map(|v| positions[v as usize])).collect();
+        let around = Groups::new(positions.len(), |add| {
+            (0..).zip(&corners).for_each(|(t, face)| face.iter().for_each(|v| add(*v as usize, t)));
+        });
+        let fan = |v: u32| {
+            let others = |t: u32| {
+                let first = corners[t as usize].iter().position(|&corner| corner == v).unwrap_or(0);
+                [1, 2].map(|k| triangles[t as usize][(first + k) % 3])
+            };
+            TriangleFan::new(positions[v as usize], around.of(v as usize), others)
+        };
+        let with_many = (0..positions.len() as u32).filter(|&v| around.of(v as usize).len() > MANY);
+        let fans = with_many.map(|v| (v, fan(v))).collect();
+        Self {
+            triangles,
+            corners,
+            around,
+            fans,
+            #[cfg(test)]
+            compared: std::sync::atomic::AtomicU64::new(0),
+        }
+    }
+
+    /// All triangles.
+    pub fn all(&self) -> &[[u32; 3]] {
+        &self.corners
+    }
+
+    /// The triangles at a vertex of the reference mesh.
+    pub fn at(&self, v: u32) -> &[u32] {
+        self.around.of(v as usize)
+    }
+
+    /// The corners of a triangle.
+    pub fn corners(&self, triangle: u32) -> [u32; 3] {
+        self.corners[triangle as usize]
+    }
+
+    /// Walks from a triangle to ever nearer ones, until one is as near as `enough`. Returns the last one and
+    /// its distance from `p`: an upper bound of how far `p` is from the boundary.
+    pub fn walk(&self, p: DVec3, from: u32, enough: f64) -> (u32, f64) {
+        let (mut best, mut least) = (from, self.squared(p, from));
+        while least > enough * enough {
+            let here = best;
+            for &v in &self.corners[here as usize] {
+                (best, least) = self.nearer(p, v, (best, least));
+            }
+            if best == here {
+                break;
+            }
+        }
+        (best, least.sqrt())
+    }
+
+    /// The triangle at a vertex that is nearest to `p`, the first one of several, and the square of its distance, if that is less than
+    /// the one of `known`; else `known`.
+    fn nearer(&self, p: DVec3, v: u32, known: (u32, f64)) -> (u32, f64) {
+        let all = self.at(v);
+        if all.len() > MANY
+            && let Some(fan) = self.fans.get(&v)
+        {
+            return fan.nearer(p, known, |t| self.squared(p, t));
+        }
+        all.iter().fold(known, |known, &t| {
+            let squared = self.squared(p, t);
+            if squared < known.1 { (t, squared) } else { known }
+        })
+    }
+
+    /// The square of how far `p` is from a triangle.
+    fn squared(&self, p: DVec3, triangle: u32) -> f64 {
+        #[cfg(test)]
+        self.compared.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        p.distance_squared(nearest_on_triangle(p, self.triangles[triangle as usize]))
+    }
+}

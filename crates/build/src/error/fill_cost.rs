@@ -1,0 +1,218 @@
+//! The exact error of a removal: what the field and the boundary lose when a hole is filled, at every reference vertex
+//! concerned.
+//!
+//! Buckets are those of [`crate::error::cost`]. A removal takes points from tetrahedra that it removes to tetrahedra that it
+//! makes; all other tetrahedra keep theirs, and their errors.
+
+use crate::change::hole::{Filling, Hole};
+use crate::error::cost::{Buckets, Reference, largest};
+use crate::error::placement::{Placement, Replacement};
+use crate::error::points::{SLACK, bounds};
+use glam::DVec3;
+use tetralod::mesh::NONE;
+use tetralod::mt::ErrorCode;
+
+/// The removals so far.
+#[derive(Default)]
+pub(crate) struct Removals {
+    /// The removal that made each tetrahedron; [`NONE`] for those of the reference mesh.
+    pub makers: Vec<u32>,
+    /// The errors of each removal, field by field.
+    pub errors: Vec<ErrorCode>,
+}
+
+/// What a removal costs whatever fills its hole.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct HoleCost {
+    /// The largest error of each field among the removals that this one depends on.
+    pub inherited: Vec<f64>,
+    /// Whether there are any.
+    pub depends: bool,
+    /// The least error of this removal in each field.
+    pub errors: Vec<f64>,
+    /// Scratch space: the removals that it depends on.
+    makers: Vec<u32>,
+}
+
+/// A hole, a filling of it, and what it is compared with.
+#[derive(Clone, Copy)]
+pub(crate) struct Input<'a> {
+    pub hole: &'a Hole,
+    pub filling: &'a Filling,
+    pub reference: &'a Reference<'a>,
+}
+
+impl Replacement for Input<'_> {
+    fn reference(&self) -> &Reference<'_> {
+        self.reference
+    }
+
+    fn border(&self) -> &[(u32, [u32; 3])] {
+        &self.filling.border
+    }
+
+    fn corner(&self, v: u32) -> DVec3 {
+        self.reference.position(v)
+    }
+
+    fn corners(&self, cell: usize) -> [DVec3; 4] {
+        self.filling.tets[cell].map(|v| self.reference.quantized.rounded(v))
+    }
+
+    fn levels(&self, cell: usize, field: usize) -> [i32; 4] {
+        self.filling.tets[cell].map(|v| self.reference.quantized.level(v, field))
+    }
+
+    fn relative(&self, q: DVec3, origin: DVec3) -> DVec3 {
+        q / DVec3::from_array(self.reference.quantized.lattice.step) - origin
+    }
+}
+
+/// The cost of one filling, and where the points go; reused from filling to filling.
+#[derive(Default)]
+pub(crate) struct FillCost {
+    pub placement: Placement,
+    flat: bool,
+    /// How far the boundary moves, as an error.
+    pub step: f64,
+    /// For each tetrahedron the sum of the squares of the errors at the points that are placed in it.
+    pub squares: Vec<f64>,
+}
+
+impl Removals {
+    pub fn new(tets: usize) -> Self {
+        Self { makers: vec![NONE; tets], ..Self::default() }
+    }
+
+    /// What the hole's tetrahedra leave to the removal of its vertex.
+    pub fn find_hole_cost(&self, hole: &Hole, reference: &Reference<'_>, cost: &mut HoleCost) {
+        let fields = reference.quantized.fields.len();
+        let HoleCost { inherited, depends, errors, makers } = cost;
+        inherited.clear();
+        // All are read before any is looked at: the memory delivers several at a time.
+        makers.clear();
+        makers.extend(hole.star.iter().map(|s| self.makers[s.tet as usize]));
+        makers.retain(|&maker| maker != NONE);
+        *depends = !makers.is_empty();
+        for f in 0..fields {
+            let of = |&maker: &u32| self.errors[maker as usize * fields + f];
+            inherited.push(makers.iter().map(of).max().unwrap_or(ErrorCode::ZERO).error());
+        }
+        errors.clone_from(inherited);
+        if *depends {
+            let overshoot = |f: usize| reference.quantized.overshoot(hole.a, &hole.link, f);
+            errors.iter_mut().enumerate().for_each(|(f, error)| *error += overshoot(f));
+        }
+    }
+}
+
+impl FillCost {
+    /// Whether the boundary stays where it is.
+    pub fn is_flat(&self) -> bool {
+        self.flat
+    }
+
+    /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned.
+    pub fn evaluate(&mut self, hole_cost: &HoleCost, buckets: &Buckets, limit: f64, input: Input<'_>) -> f64 {
+        let Input { hole, filling, reference } = input;
+        let positions = &reference.quantized.positions;
+        self.step = 0.0;
+        self.placement.start(filling.tets.len());
+        self.placement.errors.clone_from(&hole_cost.errors);
+        self.squares.clear();
+        self.squares.resize(filling.tets.len(), 0.0);
+        self.compare_centre(input);
+        if largest(&self.placement.errors) > limit {
+            return largest(&self.placement.errors);
+        }
+        self.flat = !hole.on_boundary() || hole.keeps_boundary(filling, positions);
+        if !self.flat {
+            self.step = reference.least_error_of(self.step_of_boundary(input));
+            let Self { placement, step, .. } = self;
+            if hole_cost.depends {
+                let inherited = placement.errors.iter_mut().zip(&hole_cost.inherited);
+                inherited.for_each(|(error, own)| *error = error.max(*own + *step));
+            }
+            if largest(&placement.errors) > limit {
+                return largest(&placement.errors);
+            }
+            let border = placement.place_on_border(border_points(buckets, hole), &input);
+            placement.raise(border);
+            if largest(&placement.errors) > limit {
+                return largest(&placement.errors);
+            }
+            placement.raise(chords(filling, reference));
+        }
+        let Self { placement, squares, .. } = self;
+        let mut error = largest(&placement.errors);
+        let mut hint = 0;
+        for s in &hole.star {
+            for point in buckets.inside.iter(s.tet) {
+                let (own, cell) = placement.place(point, hint, &input);
+                hint = cell;
+                error = error.max(own);
+                squares[cell] += own * own;
+                if error > limit {
+                    return error;
+                }
+            }
+        }
+        let rim = hole.border.iter().flatten().chain([&hole.a]);
+        let changed = (!self.flat).then(|| bounds(rim.map(|&v| positions[v as usize])));
+        let candidates = buckets.outside_points.candidates(hole.star.iter().map(|s| s.tet), changed);
+        error.max(placement.place_foreign(candidates, &input))
+    }
+
+    /// Compares the field at the removed vertex first: the error is mostly largest there. If the lattice has moved the vertex, it is in a
+    /// bucket.
+    fn compare_centre(&mut self, input: Input<'_>) {
+        let (a, quantized) = (input.hole.a, input.reference.quantized);
+        if !quantized.is_moved(a) {
+            let (own, cell) = self.placement.place(a, 0, &input);
+            self.squares[cell] += own * own;
+            return;
+        }
+        let (cell, lambda, depth) = self.placement.locate(quantized.places.at(a), 0, &input);
+        if depth >= -SLACK {
+            self.placement.compare(a, cell, lambda, &input);
+        }
+    }
+
+    /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the
+    /// new tetrahedra.
+    pub fn move_points(&mut self, buckets: &mut Buckets, slots: &[u32], input: Input<'_>) {
+        self.placement.place_on_border(border_points(buckets, input.hole), &input);
+        let tets = input.hole.star.iter().map(|s| s.tet).chain(slots.iter().copied());
+        tets.for_each(|t| buckets.clear(t));
+        self.placement.move_points(buckets, |cell| slots[cell as usize]);
+    }
+
+    /// How far the old boundary is from the new one.
+    fn step_of_boundary(&mut self, input: Input<'_>) -> f64 {
+        let Input { hole, filling, reference } = input;
+        let centre = reference.position(hole.a);
+        let mut largest = self.placement.nearest(centre, filling.moved, &input).2;
+        // Between the vertex and the link the new boundary may be further away than at either. Each edge is the first one
+        // of one triangle.
+        for &[x, _] in &hole.border {
+            let middle = (centre + reference.position(x)) * 0.5;
+            largest = largest.max(self.placement.nearest(middle, filling.moved, &input).2);
+        }
+        largest
+    }
+}
+
+/// The reference vertices of the boundary at a hole.
+fn border_points(buckets: &Buckets, hole: &Hole) -> impl Iterator<Item = u32> {
+    let own = hole.on_boundary().then_some(hole.a);
+    hole.star.iter().flat_map(|s| buckets.border.iter(s.tet)).chain(own)
+}
+
+/// How far the middles of the new boundary triangles and of their edges are from the reference boundary, as an error.
+/// Their corners are on it.
+fn chords(filling: &Filling, reference: &Reference<'_>) -> f64 {
+    filling.border[..filling.moved].iter().fold(0.0, |largest, &(_, triangle)| {
+        let from = triangle.map(|v| reference.boundary.at(v).first().copied().unwrap_or(NONE));
+        reference.chord(triangle.map(|v| reference.position(v)), from, largest)
+    })
+}

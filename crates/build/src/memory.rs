@@ -1,0 +1,110 @@
+//! How much memory building takes: known before it begins, from counts alone.
+
+use super::parts::LEFT_AT_INTERFACE;
+use super::{Construction, Method};
+use tetralod::mt::MtKind;
+
+/// Bytes that building takes for a tetrahedron of the reference mesh with one field. Arrays that grow by doubling make it differ by a
+/// third from one size to the next, so this is the most that was measured.
+fn bytes_a_tetrahedron(construction: Construction) -> u64 {
+    match (construction.method(), construction.kind()) {
+        (Method::Insert, _) => 680,
+        (Method::Collapse, MtKind::Explicit) => 800,
+        (Method::Collapse, _) => 340,
+        (Method::Decimate, MtKind::HalfEdge) => 180,
+        (Method::Decimate, _) => 620,
+    }
+}
+
+/// Tetrahedra of a triangulation for each hundred of its points.
+const TRIANGULATED: u64 = 680;
+
+/// The memory in bytes that building in `parts` takes at most at any time (see [`parts`](super::parts)), `at_a_time` of them side by
+/// side, of a mesh of so many points, tetrahedra and fields. One process holds the mesh while it is parted. A forecast, as
+/// [`memory_needed`].
+pub fn memory_needed_in_parts([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
+    let parting = tetrahedra.saturating_mul(24).saturating_add(points.saturating_mul(100 + 24 * fields));
+    parting.max(after_parting([points, tetrahedra, fields], parts, at_a_time))
+}
+
+/// The same for a mesh that is parted [piece by piece](super::parts::Piecewise), of so many pieces, the largest of which has so many
+/// tetrahedra: the whole mesh is never in memory, but what is near the places at which pieces meet. Pieces are taken to be as long as they
+/// are wide; long ones meet at more places.
+pub fn memory_needed_in_pieces(
+    counts: [u64; 3],
+    [pieces, largest]: [u64; 2],
+    parts: u32,
+    at_a_time: u32,
+) -> u64 {
+    let [points, tetrahedra, fields] = counts;
+    let each = 120 + 16 * fields;
+    let piece = largest.saturating_mul(each);
+    let part = (tetrahedra / u64::from(parts.max(1))).saturating_mul(each);
+    let pieces = pieces.max(1);
+    // Six sides of cubes, each of which two of them share.
+    let side = (points as f64 / pieces as f64).cbrt();
+    let meeting = if pieces > 1 { (3.0 * pieces as f64 * side * side) as u64 } else { 0 };
+    let near = meeting.saturating_mul(900 + 100 * fields).saturating_add(points.saturating_mul(8));
+    let parting = piece.max(part).saturating_add(near);
+    parting.max(after_parting(counts, parts, at_a_time))
+}
+
+/// What the steps after parting take.
+fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
+    let of_points = |bytes: u64| points.saturating_mul(bytes);
+    let of_tets = |bytes: u64| tetrahedra.saturating_mul(bytes);
+    let whole = of_tets(200).saturating_add(of_points(120 * fields.saturating_sub(1)));
+    let part = whole / u64::from(parts.max(1)) * u64::from(at_a_time);
+    // What is left of the children is an eighth of their tetrahedra, with all of their points.
+    let joining = of_tets(200) / 8 + of_points(200 + 60 * fields);
+    let assembling = of_tets(60).saturating_add(of_points(90 + 30 * fields));
+    // Of what has been freed, allocators keep some for each thread. One step alone is done by the thread that assembles.
+    let joins = parts.div_ceil(8);
+    // But more stay where parts meet: at both sides of planes across a grid, two triangles for each square.
+    let planes = 3.0 * (libm::cbrt(parts.into()) - 1.0);
+    let triangles = 4.0 * planes * libm::cbrt(points as f64).powi(2);
+    let at_interfaces = (triangles as u64).saturating_mul(LEFT_AT_INTERFACE as u64).min(tetrahedra);
+    let first = joining.saturating_add(at_interfaces.saturating_sub(tetrahedra / 8).saturating_mul(200));
+    let side_by_side = if joins > 1 { first / u64::from(joins) * u64::from(at_a_time.min(joins)) } else { 0 };
+    let kept = if at_a_time > 1 { part.max(side_by_side) / 2 } else { 0 };
+    part.max(joining.max(assembling).saturating_add(kept))
+}
+
+/// The memory in bytes that [`build`](super::build) and [`encode`](tetralod::format::encode) take at most for a mesh of so many points,
+/// tetrahedra and fields (vectors count by their parts, time series by their steps), the mesh included. A forecast: measured for
+/// meshes of many shapes, but no promise.
+///
+/// ```
+/// use tetralod::builder::{BuildConfig, memory_needed};
+///
+/// // A grid of 256³ points: six tetrahedra a cell.
+/// let construction = BuildConfig::default().construction;
+/// let bytes = memory_needed(construction, 256_u64.pow(3), 6 * 255_u64.pow(3), 1);
+/// assert!((15..20).contains(&(bytes >> 30)), "about 17 GiB");
+/// ```
+pub fn memory_needed(construction: Construction, points: u64, tetrahedra: u64, fields: u64) -> u64 {
+    let tetrahedra = match construction.method() {
+        Method::Insert => points.saturating_mul(TRIANGULATED) / 100,
+        Method::Collapse | Method::Decimate => tetrahedra,
+    };
+    let of_a_field = match construction.method() {
+        Method::Collapse => 400,
+        Method::Insert | Method::Decimate => 120,
+    };
+    let more_fields = points.saturating_mul(fields.saturating_sub(1)).saturating_mul(of_a_field);
+    tetrahedra.saturating_mul(bytes_a_tetrahedron(construction)).saturating_add(more_fields)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::memory_needed_in_parts;
+
+    #[test]
+    fn what_threads_have_taken_counts_after_them() {
+        // What one process takes for a grid of 65³ points, two parts at a time, of which glibc keeps some of what is free.
+        for (parts, measured) in [(4, 176_000_000), (8, 155_000_000)] {
+            let needed = memory_needed_in_parts([274_625, 1_572_864, 1], parts, 2);
+            assert!(needed > measured, "{parts} parts: {needed}");
+        }
+    }
+}

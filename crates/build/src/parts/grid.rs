@@ -1,0 +1,365 @@
+//! The parts of a regular grid, made one at a time: nothing but the values of the whole is in memory.
+//!
+//! The parts are those that [`part`](super::part) makes of the grid's points and tetrahedra, byte for byte.
+
+use super::PartsError;
+use super::partition::{CUT_BITS, best_cut, shift};
+use super::piece::{Head, Part, Piece};
+use super::plan::{Node, Plan};
+use crate::error::points::as_vec;
+use crate::lattice::field_lattice;
+use crate::lattice::field_selection;
+use crate::lattice::position_lattice;
+use crate::lattice::quantize::{self, Quantized};
+use crate::restrict::preserve::NEAR;
+use crate::restrict::restrictions::Restrictions;
+use crate::{BuildConfig, BuildError, Purpose};
+use glam::DVec3;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use tetralod::geom::{Bounds, Lattice, ON_LATTICE};
+use tetralod::mesh::{Field, Grid, MAX_TETS, MeshError, TetMesh, kuhn_tets};
+use tetralod::mt::{FieldInfo, MAX_UPDATES, MtInfo, MtKind};
+
+/// A grid and its parts.
+pub(super) struct GridCut<'a> {
+    grid: Grid,
+    lattice: Lattice,
+    /// log2 of the lattice's steps in a cell.
+    spare: u32,
+    fields: Vec<&'a Field>,
+    /// All values, of these fields or not, for the checksum.
+    mesh: &'a TetMesh,
+    /// Level by level and box by box the axis of a cut and the first cell behind it.
+    cuts: Vec<Vec<(usize, u32)>>,
+    /// Points that stay: their numbers, ascending.
+    kept: Vec<u32>,
+    /// The cells of each part along each axis.
+    boxes: Vec<[Range<u32>; 3]>,
+}
+
+impl<'a> GridCut<'a> {
+    /// Cuts a grid alone; none if its points are not all on a lattice of its own, where the whole mesh decides on another one.
+    pub fn new(mesh: &'a TetMesh, config: &BuildConfig, parts: u32) -> Result<Option<Self>, PartsError> {
+        let Some(grid) = mesh.grid else { return Ok(None) };
+        let [points, tetrahedra] = mesh.counts();
+        if points > u64::from(MAX_UPDATES) || tetrahedra > MAX_TETS as u64 {
+            return Err(BuildError::TooLarge.into());
+        }
+        if tetrahedra == 0 {
+            return Err(BuildError::Empty.into());
+        }
+        let fields = field_selection::fields(mesh, config)?;
+        for field in &fields {
+            if field.values.len() as u64 != points {
+                let error = MeshError::FieldLength {
+                    field: field.name.clone(),
+                    values: field.values.len(),
+                    points: points as usize,
+                };
+                return Err(BuildError::from(error).into());
+            }
+            if let Some(point) = field.values.iter().position(|x| !x.is_finite()) {
+                return Err(BuildError::NotFinite { point: point as u32 }.into());
+            }
+        }
+        let Some(lattice) = position_lattice::of_grid(&grid, config) else { return Ok(None) };
+        position_lattice::check_scale(&lattice)?;
+        let spare = ((grid.spacing[0] / lattice.step[0]) as u32).ilog2();
+        let mut cut = Self {
+            grid,
+            lattice,
+            spare,
+            fields,
+            mesh,
+            cuts: Vec::new(),
+            kept: Vec::new(),
+            boxes: Vec::new(),
+        };
+        cut.kept = cut.kept_points(config)?;
+        if !cut.is_exact() {
+            return Ok(None);
+        }
+        cut.cut(parts)?;
+        Ok(Some(cut))
+    }
+
+    /// The points at the places that a configuration keeps, ascending: see `preserve::kept_points`.
+    fn kept_points(&self, config: &BuildConfig) -> Result<Vec<u32>, PartsError> {
+        let Grid { dims, origin, spacing } = self.grid;
+        let ends = [[0; 3], dims.map(|n| n - 1)].map(|index| self.grid.point(index));
+        let near = NEAR * Bounds::of(&ends).diagonal();
+        let mut kept = Vec::new();
+        for &place in &config.keep_points {
+            let along =
+                |k: usize| ((place[k] - origin[k]) / spacing[k]).round().clamp(0.0, f64::from(dims[k] - 1));
+            let index = [0, 1, 2].map(|k| along(k) as u32);
+            if DVec3::from(self.grid.point(index))
+                .distance(DVec3::from(place))
+                .partial_cmp(&near)
+                .is_none_or(std::cmp::Ordering::is_gt)
+            {
+                return Err(BuildError::NoPoint { place }.into());
+            }
+            kept.push(index[0] + dims[0] * (index[1] + dims[1] * index[2]));
+        }
+        kept.sort_unstable();
+        kept.dedup();
+        Ok(kept)
+    }
+
+    /// All points of the grid: their indices.
+    fn points(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
+        let [nx, ny, nz] = self.grid.dims;
+        (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
+    }
+
+    /// A point on the lattice.
+    fn position(&self, index: [u32; 3]) -> [i32; 3] {
+        index.map(|i| (i << self.spare) as i32)
+    }
+
+    /// Whether the lattice has each point where it is.
+    fn is_exact(&self) -> bool {
+        let (origin, step) = (DVec3::from(self.lattice.origin), DVec3::from(self.lattice.step));
+        let mut points = self.points();
+        points.all(|index| {
+            let (p, q) = (self.grid.point(index), self.position(index));
+            let place = (DVec3::from(p) - origin) / step;
+            self.lattice.nearest(p) == q && place.distance(as_vec(q)) < ON_LATTICE
+        })
+    }
+
+    /// Cuts the cells as the tetrahedra would be.
+    fn cut(&mut self, parts: u32) -> Result<(), PartsError> {
+        let Self { grid, lattice, spare, .. } = self;
+        let shift = shift(lattice.bits);
+        let place = |cell: u32| ((cell << *spare) >> shift) as usize;
+        let mut boxes = vec![grid.dims.map(|n| 0..n - 1)];
+        for _ in 0..parts.ilog2() {
+            let mut cuts = Vec::with_capacity(boxes.len());
+            let mut halves = Vec::with_capacity(2 * boxes.len());
+            for cells in boxes {
+                let spans =
+                    [0, 1, 2].map(|axis: usize| [place(cells[axis].start), place(cells[axis].end - 1)]);
+                let counts = [0, 1, 2].map(|axis: usize| {
+                    let others: u32 =
+                        (0..3).filter(|&k| k != axis).map(|k: usize| cells[k].len() as u32).product();
+                    let mut counts = vec![0; 1 << CUT_BITS];
+                    cells[axis].clone().for_each(|cell| counts[place(cell)] += 6 * others);
+                    counts
+                });
+                let tetrahedra = self.mesh.counts()[1];
+                let (axis, behind) = best_cut(&spans, &counts, lattice.step)
+                    .ok_or(PartsError::TooMany { parts, tetrahedra })?;
+                let first =
+                    cells[axis].clone().find(|&cell| place(cell) >= behind).unwrap_or(cells[axis].end);
+                let (mut below, mut above) = (cells.clone(), cells);
+                (below[axis].end, above[axis].start) = (first, first);
+                cuts.push((axis, first));
+                halves.extend([below, above]);
+            }
+            self.cuts.push(cuts);
+            boxes = halves;
+        }
+        self.boxes = boxes;
+        Ok(())
+    }
+
+    /// The part that a cell belongs to.
+    fn part_of(&self, cell: [u32; 3]) -> u32 {
+        self.cuts.iter().fold(0, |part, cuts| {
+            let (axis, first) = cuts[part as usize];
+            2 * part + u32::from(cell[axis] >= first)
+        })
+    }
+
+    /// Passes on all parts.
+    pub fn part(
+        &self,
+        config: &BuildConfig,
+        purpose: Purpose,
+        metadata: BTreeMap<String, String>,
+        put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
+    ) -> Result<Plan, PartsError> {
+        let info = self.info(config)?;
+        let sides = self.position(self.grid.dims.map(|n| n - 1));
+        let whole = (self.boxes.len() as u32, self.checksum(), sides);
+        let plan = Plan::new(&info, config, purpose, whole, metadata);
+        Restrictions::of_angles(config, &self.lattice_alone(&info))?;
+        for (index, cells) in (0..).zip(&self.boxes) {
+            let head = Head { plan: plan.clone(), node: Node { level: 0, index }, built: false };
+            put(Part { head, piece: self.piece(index, cells) })?;
+        }
+        Ok(plan)
+    }
+
+    /// The lattices, without points: what angles are measured by.
+    fn lattice_alone(&self, info: &MtInfo) -> Quantized {
+        quantize::lattices_alone(info.lattice, info.fields.clone(), info.quantization)
+    }
+
+    fn info(&self, config: &BuildConfig) -> Result<MtInfo, PartsError> {
+        let fields: Vec<FieldInfo> = field_lattice::field_lattices(&self.fields, config)?;
+        let [vertices, tetrahedra] = self.mesh.counts().map(|count| count as u32);
+        let ends = [[0; 3], self.grid.dims.map(|n| n - 1)].map(|index| self.grid.point(index));
+        let moved = |index| {
+            position_lattice::distance(self.grid.point(index), self.lattice.point(self.position(index)))
+        };
+        Ok(MtInfo {
+            kind: MtKind::HalfEdge,
+            lattice: self.lattice,
+            fields,
+            vertices,
+            tetrahedra,
+            updates: 0,
+            displacement_per_error: config.displacement * Bounds::of(&ends).diagonal(),
+            quantization: self.points().map(moved).fold(0.0, f64::max),
+            bounds: None,
+        })
+    }
+
+    /// As of the whole mesh.
+    fn checksum(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        let mut row = Vec::new();
+        let [nx, ny, nz] = self.grid.dims;
+        for (z, y) in (0..nz).flat_map(|z| (0..ny).map(move |y| (z, y))) {
+            row.clear();
+            (0..nx).for_each(|x| row.extend(self.grid.point([x, y, z]).iter().flat_map(|x| x.to_le_bytes())));
+            hasher.update(&row);
+        }
+        let first = |[x, y, z]: [u32; 3]| x + nx * (y + ny * z);
+        let cube = kuhn_tets([2; 3]);
+        for (z, y) in (0..nz - 1).flat_map(|z| (0..ny - 1).map(move |y| (z, y))) {
+            row.clear();
+            for x in 0..nx - 1 {
+                let corner = |v: u32| first([x + (v & 1), y + (v >> 1 & 1), z + (v >> 2)]);
+                row.extend(cube.iter().flatten().flat_map(|&v| corner(v).to_le_bytes()));
+            }
+            hasher.update(&row);
+        }
+        for values in self.mesh.fields.iter().flat_map(|field| field.values.chunks(4096)) {
+            row.clear();
+            row.extend(values.iter().flat_map(|x| x.to_le_bytes()));
+            hasher.update(&row);
+        }
+        hasher.finalize()
+    }
+
+    fn piece(&self, index: u32, cells: &[Range<u32>; 3]) -> Piece {
+        let [nx, ny, _] = self.grid.dims;
+        let of_whole = |[x, y, z]: [u32; 3]| x + nx * (y + ny * z);
+        // Points go one further than cells.
+        let [xs, ys, zs] = cells.clone().map(|cells| cells.start..cells.end + 1);
+        let here: Vec<[u32; 3]> = zs
+            .clone()
+            .flat_map(|z| {
+                let xs = xs.clone();
+                ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
+            })
+            .collect();
+        let (across, layer) = (xs.len() as u32, (xs.len() * ys.len()) as u32);
+        let local = |[x, y, z]: [u32; 3]| (x - xs.start) + across * (y - ys.start) + layer * (z - zs.start);
+        let cube = kuhn_tets([2; 3]);
+        let mut tets = Vec::with_capacity(6 * cells.iter().map(Range::len).product::<usize>());
+        for z in cells[2].clone() {
+            for y in cells[1].clone() {
+                for x in cells[0].clone() {
+                    let corner = |v: u32| local([x + (v & 1), y + (v >> 1 & 1), z + (v >> 2)]);
+                    tets.extend(cube.iter().map(|tet| tet.map(corner)));
+                }
+            }
+        }
+        let values = |p: &[u32; 3]| {
+            let at = of_whole(*p) as usize;
+            self.fields.iter().map(move |field| field.values[at])
+        };
+        let shared = (0..).zip(&here).filter_map(|(i, &p)| {
+            let [first, last] = self.parts_at(p);
+            (first != last).then_some((i, first, last))
+        });
+        Piece {
+            positions: here.iter().map(|&p| self.position(p)).collect(),
+            values: here.iter().flat_map(values).collect(),
+            shortest: here.iter().map(|&p| self.shortest(p)).collect(),
+            shared: shared.collect(),
+            interface: self.interface(index, cells, local),
+            kept: (0..)
+                .zip(&here)
+                .filter(|(_, p)| self.kept.binary_search(&of_whole(**p)).is_ok())
+                .map(|(i, _)| i)
+                .collect(),
+            points: here.iter().map(|&p| of_whole(p)).collect(),
+            tets,
+            ..Piece::default()
+        }
+    }
+
+    /// The first and the last part that have a point.
+    fn parts_at(&self, p: [u32; 3]) -> [u32; 2] {
+        let along = |k: usize| p[k].saturating_sub(1)..(p[k] + 1).min(self.grid.dims[k] - 1);
+        let [xs, ys, zs] = [0, 1, 2].map(along);
+        let mut ends = [u32::MAX, 0];
+        for z in zs {
+            for y in ys.clone() {
+                for x in xs.clone() {
+                    let part = self.part_of([x, y, z]);
+                    ends = [ends[0].min(part), ends[1].max(part)];
+                }
+            }
+        }
+        ends
+    }
+
+    /// The square of the shortest edge at a point: one along an axis.
+    fn shortest(&self, p: [u32; 3]) -> f64 {
+        let step = DVec3::from(self.lattice.step);
+        let place = |p: [u32; 3]| as_vec(self.position(p)) * step;
+        let mut least = f64::INFINITY;
+        for k in 0..3 {
+            for next in [p[k].checked_sub(1), Some(p[k] + 1).filter(|&i| i < self.grid.dims[k])] {
+                let Some(next) = next else { continue };
+                let mut other = p;
+                other[k] = next;
+                least = least.min(place(p).distance_squared(place(other)));
+            }
+        }
+        least
+    }
+
+    /// The faces of a part to others: each side of a cell is cut from its lowest to its highest corner.
+    fn interface(
+        &self,
+        index: u32,
+        cells: &[Range<u32>; 3],
+        local: impl Fn([u32; 3]) -> u32,
+    ) -> Vec<([u32; 3], u32)> {
+        let mut faces = Vec::new();
+        for axis in 0..3 {
+            let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+            let ends = [
+                (cells[axis].start, cells[axis].start.checked_sub(1)),
+                (cells[axis].end, Some(cells[axis].end).filter(|&cell| cell + 1 < self.grid.dims[axis])),
+            ];
+            for (plane, beyond) in ends {
+                let Some(beyond) = beyond else { continue };
+                for (a, b) in cells[u].clone().flat_map(|a| cells[v].clone().map(move |b| (a, b))) {
+                    let at = |along: u32, i: u32, j: u32| {
+                        let mut p = [0; 3];
+                        (p[axis], p[u], p[v]) = (along, a + i, b + j);
+                        p
+                    };
+                    let other = self.part_of(at(beyond, 0, 0));
+                    debug_assert_ne!(other, index, "a part is a box");
+                    let [low, high] = [at(plane, 0, 0), at(plane, 1, 1)].map(&local);
+                    for middle in [at(plane, 1, 0), at(plane, 0, 1)].map(&local) {
+                        faces.push(([low, middle, high], other));
+                    }
+                }
+            }
+        }
+        faces.sort_unstable();
+        faces
+    }
+}

@@ -1,0 +1,351 @@
+//! What is left of a part of the domain, and the updates that were made of the rest: what steps hand to each other.
+
+use super::PartsError;
+use super::plan::{Node, Plan};
+use super::wire::{read_frame, read_magic, skip_frame, write_frame, write_magic};
+use serde::{Deserialize, Serialize};
+use std::io::{Read, Seek, Write};
+use tetralod::geom::orient3d;
+use tetralod::mesh::NONE;
+
+/// A part of the domain with what is left of its mesh; [`super`] tells what it is for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    pub(super) head: Head,
+    pub(super) piece: Piece,
+}
+
+/// The updates that were made of a part, in the order of the MT.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartUpdates {
+    pub(super) head: Head,
+    pub(super) rows: UpdateRows,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Head {
+    pub plan: Plan,
+    pub node: Node,
+    /// Whether it has been built: updates follow then, before what is left.
+    pub built: bool,
+}
+
+/// An update of a node: the node, and its number there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(super) struct Made {
+    pub node: Node,
+    pub update: u32,
+}
+
+/// A mesh, what its vertices were, and where they are now. Points and tetrahedra are numbers of this piece unless it says otherwise.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Piece {
+    /// The reference vertex of the whole for each point, ascending.
+    pub points: Vec<u32>,
+    /// On the lattice of the whole.
+    pub positions: Vec<[i32; 3]>,
+    /// Point by point and field by field.
+    pub values: Vec<f64>,
+    /// For each point the square of the shortest edge of the reference mesh there; see `Quantized::shortest_edges`.
+    pub shortest: Vec<f64>,
+    /// Points that the lattice has moved, and where they were, in its steps.
+    pub moved: Vec<(u32, [f64; 3])>,
+    /// Points that belong to other parts, too, and the first and the last part that has them.
+    pub shared: Vec<(u32, u32, u32)>,
+    pub tets: Vec<[u32; 4]>,
+    /// Faces to other parts, their corners ascending, and the part behind each.
+    pub interface: Vec<([u32; 3], u32)>,
+    /// For each tetrahedron what made it, as a place in `earlier`; [`NONE`] for those of the reference mesh. Empty if all are.
+    pub makers: Vec<u32>,
+    /// Which of its faces were inside then: see `Collapses::inner`.
+    pub inner: Vec<u8>,
+    /// The updates that are the inverses of what made tetrahedra, and their errors, field by field.
+    pub earlier: Vec<Made>,
+    pub earlier_errors: Vec<u16>,
+    /// Points that are in buckets, and of which tetrahedron: see `builder::cost`.
+    pub inside: Vec<(u32, u32)>,
+    pub border: Vec<(u32, u32)>,
+    pub foreign: Vec<(u32, u32)>,
+    /// Those in buckets of tetrahedra that they are outside of.
+    pub outside: Vec<u32>,
+    /// The boundary of the reference mesh, once the part has been built.
+    pub boundary: Vec<[u32; 3]>,
+    /// The region of each tetrahedron, if regions are kept apart; else empty.
+    pub regions: Vec<u32>,
+    /// Points that stay where they are, ascending.
+    pub kept: Vec<u32>,
+    /// How far the removal of each vertex reaches, once the part has been built: see `builder::reach`.
+    pub reaches: Vec<(u32, [[i32; 3]; 2])>,
+}
+
+/// Updates in their order, and what removes the tetrahedra of their stars.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct UpdateRows {
+    /// The reference vertex that each inserts.
+    pub vertices: Vec<u32>,
+    /// The reference vertex near to it.
+    pub near: Vec<u32>,
+    /// Field by field.
+    pub errors: Vec<u16>,
+    /// How many tetrahedra each inserts.
+    pub stars: Vec<u8>,
+    /// For each of these the update that removes it: 0 if none does, `2 u + 1` for update `u` of these rows, `2 i + 2` for the `i`-th
+    /// of `earlier`.
+    pub removers: Vec<u32>,
+    /// Which of its faces go with it: see `Collapses::inner`.
+    pub inner: Vec<u8>,
+    pub earlier: Vec<Made>,
+}
+
+impl UpdateRows {
+    /// The first so many updates, and the others.
+    pub fn split(mut self, count: usize, fields: usize) -> (Self, Self) {
+        let star = self.stars[..count].iter().map(|&star| usize::from(star)).sum();
+        let rest = Self {
+            vertices: self.vertices.split_off(count),
+            near: self.near.split_off(count),
+            errors: self.errors.split_off(count * fields),
+            stars: self.stars.split_off(count),
+            removers: self.removers.split_off(star),
+            inner: self.inner.split_off(star),
+            earlier: self.earlier.clone(),
+        };
+        (self, rest)
+    }
+}
+
+impl Part {
+    /// The plan that the part belongs to.
+    pub fn plan(&self) -> &Plan {
+        &self.head.plan
+    }
+
+    /// Which part it is.
+    pub fn node(&self) -> Node {
+        self.head.node
+    }
+
+    /// Tetrahedra that are left.
+    pub fn tetrahedra(&self) -> usize {
+        self.piece.tets.len()
+    }
+
+    /// Writes a part that has not been built.
+    ///
+    /// # Errors
+    /// If `out` fails.
+    pub fn write(&self, out: &mut dyn Write) -> Result<(), PartsError> {
+        write_magic(out)?;
+        write_frame(out, &self.head)?;
+        write_frame(out, &self.piece)
+    }
+
+    /// Writes a part that has been built, with its updates.
+    ///
+    /// # Errors
+    /// If `out` fails.
+    pub fn write_built(&self, updates: &PartUpdates, out: &mut dyn Write) -> Result<(), PartsError> {
+        write_magic(out)?;
+        write_frame(out, &self.head)?;
+        write_frame(out, &updates.rows)?;
+        write_frame(out, &self.piece)
+    }
+
+    /// Reads a part, built or not.
+    ///
+    /// # Errors
+    /// If `input` fails, or holds no whole and sound part.
+    pub fn read<R: Read + Seek>(input: &mut R) -> Result<Self, PartsError> {
+        read_magic(input)?;
+        let head: Head = read_frame(input)?;
+        if head.built {
+            skip_frame(input)?;
+        }
+        let piece: Piece = read_frame(input)?;
+        let part = Self { head, piece };
+        part.check().map_err(|what| PartsError::Damaged { what })?;
+        Ok(part)
+    }
+
+    /// Checks what building relies on.
+    fn check(&self) -> Result<(), &'static str> {
+        let Self { head: Head { plan, node, .. }, piece } = self;
+        let (points, fields) = (piece.points.len(), plan.fields.len());
+        expect(plan.has(*node) && fields > 0, "it is not of its plan")?;
+        let rising = piece.points.windows(2).all(|pair| pair[0] < pair[1]);
+        let known = piece.points.last().is_none_or(|&last| last < plan.counts[0]);
+        expect(rising && known, "its points are others")?;
+        let side = 1_i32.checked_shl(plan.lattice.2).filter(|_| plan.lattice.2 <= 30).unwrap_or(0);
+        let is_on = |p: &[i32; 3]| p.iter().all(|x| (0..=side).contains(x));
+        let are_finite = piece.values.iter().all(|x| x.is_finite());
+        let lengths = [piece.positions.len(), piece.shortest.len(), piece.values.len() / fields];
+        expect(lengths == [points; 3] && piece.values.len() == points * fields, "its points lack values")?;
+        expect(are_finite && piece.positions.iter().all(is_on), "its points are off the lattice")?;
+        let at = |v: u32| piece.positions.get(v as usize);
+        let is_positive = |&[a, b, c, d]: &[u32; 4]| {
+            let all = at(a).zip(at(b)).zip(at(c).zip(at(d)));
+            all.is_some_and(|((&a, &b), (&c, &d))| orient3d(a, b, c, d) > 0)
+        };
+        expect(
+            !piece.tets.is_empty() && piece.tets.iter().all(is_positive),
+            "a tetrahedron is not positive",
+        )?;
+        let (tets, earlier) = (piece.tets.len(), piece.earlier.len());
+        let labelled = if plan.has_regions { tets } else { 0 };
+        expect(piece.regions.len() == labelled, "its tetrahedra lack regions")?;
+        let made = |&maker: &u32| maker == NONE || (maker as usize) < earlier;
+        let marks = [piece.makers.len(), piece.inner.len()];
+        expect(marks == [0; 2] || marks == [tets; 2], "its tetrahedra lack marks")?;
+        expect(piece.makers.iter().all(made), "its tetrahedra have other marks")?;
+        expect(piece.earlier_errors.len() == earlier * fields, "its updates lack errors")?;
+        expect(piece.earlier.iter().all(|made| plan.has(made.node)), "its updates are others")?;
+        let is_point = |v: &u32| (*v as usize) < points;
+        let in_bucket = |(v, t): &(u32, u32)| is_point(v) && (*t as usize) < tets;
+        let buckets = [&piece.inside, &piece.border, &piece.foreign];
+        expect(buckets.iter().all(|all| all.iter().all(in_bucket)), "its buckets are others")?;
+        let refers = piece.outside.iter().all(is_point)
+            && piece.moved.windows(2).all(|pair| pair[0].0 < pair[1].0)
+            && piece.moved.iter().all(|(v, place)| is_point(v) && place.iter().all(|x| x.is_finite()))
+            && piece.shared.iter().all(|(v, first, last)| is_point(v) && first <= last)
+            && piece.reaches.iter().all(|(v, _)| is_point(v))
+            && piece.kept.iter().all(is_point)
+            && piece.interface.iter().all(|(face, _)| face.iter().all(is_point))
+            && piece.boundary.iter().all(|face| face.iter().all(is_point));
+        expect(refers, "it refers to other points")
+    }
+}
+
+impl PartUpdates {
+    /// Which part they were made of.
+    pub fn node(&self) -> Node {
+        self.head.node
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.rows.vertices.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.rows.vertices.is_empty()
+    }
+
+    /// Reads the updates of a part that has been built.
+    ///
+    /// # Errors
+    /// If `input` fails, or holds no whole and sound part that has been built.
+    pub fn read(input: &mut dyn Read) -> Result<Self, PartsError> {
+        read_magic(input)?;
+        let head: Head = read_frame(input)?;
+        if !head.built {
+            return Err(PartsError::Damaged { what: "it has not been built" });
+        }
+        let rows: UpdateRows = read_frame(input)?;
+        let updates = Self { head, rows };
+        updates.check().map_err(|what| PartsError::Damaged { what })?;
+        Ok(updates)
+    }
+
+    /// Checks what assembling relies on.
+    fn check(&self) -> Result<(), &'static str> {
+        let Self { head: Head { plan, node, .. }, rows } = self;
+        let (count, fields) = (rows.vertices.len(), plan.fields.len());
+        expect(plan.has(*node) && fields > 0, "it is not of its plan")?;
+        let lengths = [rows.near.len(), rows.stars.len(), rows.errors.len() / fields];
+        expect(lengths == [count; 3] && rows.errors.len() == count * fields, "its updates lack parts")?;
+        let inserted: usize = rows.stars.iter().map(|&star| usize::from(star)).sum();
+        expect([rows.removers.len(), rows.inner.len()] == [inserted; 2], "its updates lack tetrahedra")?;
+        let known = |&v: &u32| v < plan.counts[0];
+        expect(rows.vertices.iter().chain(&rows.near).all(known), "its updates have other points")?;
+        let fits = |&remover: &u32| match remover.checked_sub(1) {
+            None => true,
+            Some(code) if code % 2 == 0 => ((code / 2) as usize) < count,
+            Some(code) => ((code / 2) as usize) < rows.earlier.len(),
+        };
+        let all_fit = rows.removers.iter().all(fits) && rows.earlier.iter().all(|made| plan.has(made.node));
+        expect(all_fit, "its updates refer to others")
+    }
+}
+
+fn expect(holds: bool, what: &'static str) -> Result<(), &'static str> {
+    if holds { Ok(()) } else { Err(what) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{build_part, part};
+    use super::*;
+    use crate::BuildConfig;
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+    use std::ops::ControlFlow;
+    use tetralod::mesh::{Field, Grid, TetMesh};
+
+    /// What is wrong, and how it gets so.
+    type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
+
+    /// A part as it is written first, and when it has been built, with its updates.
+    fn parts() -> (Part, Part, PartUpdates) {
+        let grid = Grid { dims: [9; 3], origin: [0.0; 3], spacing: [1.0; 3] };
+        let values = (0..9_u32.pow(3)).map(|i| f64::from(i * i % 997)).collect();
+        let mesh = TetMesh::from_grid(grid, vec![Field::new("h", values)]);
+        let mut first = None;
+        let put = &mut |part| {
+            first.get_or_insert(part);
+            Ok(())
+        };
+        part(&mesh, &BuildConfig::default(), 2, BTreeMap::new(), put).expect("a mesh that can be parted");
+        let first = first.expect("a part");
+        let (built, updates) =
+            build_part(first.clone(), &mut |_| ControlFlow::Continue(())).expect("a part to build");
+        (first, built, updates)
+    }
+
+    #[test]
+    fn content_with_good_checksums_is_not_trusted() {
+        let (first, built, updates) = parts();
+        let beyond = first.piece.points.len() as u32;
+        let changes: [Change<'_, Piece>; 12] = [
+            ("a tetrahedron inside out", &|p| p.tets[0].swap(0, 1)),
+            ("a flat tetrahedron", &|p| p.tets[0][1] = p.tets[0][0]),
+            ("a corner that is no point", &|p| p.tets[0][3] = beyond),
+            ("points out of order", &|p| p.points.swap(3, 4)),
+            ("a point that the whole lacks", &|p| p.points[beyond as usize - 1] = u32::MAX),
+            ("a point off the lattice", &|p| p.positions[0][1] = -1),
+            ("no number", &|p| p.values[0] = f64::NAN),
+            ("a value too few", &|p| p.values.truncate(1)),
+            ("no tetrahedra", &|p| p.tets.clear()),
+            ("a bucket of no tetrahedron", &|p| p.inside.push((0, u32::MAX))),
+            ("a mark of no update", &|p| p.makers = vec![p.earlier.len() as u32; p.tets.len()]),
+            ("a kept point that is none", &|p| p.kept.push(beyond)),
+        ];
+        for (what, change) in changes {
+            for part in [&first, &built] {
+                let mut part = part.clone();
+                change(&mut part.piece);
+                let mut bytes = Vec::new();
+                if part.head.built { part.write_built(&updates, &mut bytes) } else { part.write(&mut bytes) }
+                    .expect("bytes");
+                let read = Part::read(&mut Cursor::new(&bytes));
+                assert!(matches!(read, Err(PartsError::Damaged { .. })), "{what}");
+            }
+        }
+        let changes: [Change<'_, UpdateRows>; 6] = [
+            ("a vertex that the whole lacks", &|r| r.vertices[0] = u32::MAX),
+            ("a near vertex that the whole lacks", &|r| r.near[0] = u32::MAX),
+            ("an update without an error", &|r| r.errors.clear()),
+            ("a tetrahedron too many", &|r| r.stars[0] += 1),
+            ("a remover that is no update", &|r| r.removers[0] = u32::MAX),
+            ("a remover that was none before", &|r| r.removers[0] = 2 * r.earlier.len() as u32 + 2),
+        ];
+        for (what, change) in changes {
+            let mut updates = updates.clone();
+            change(&mut updates.rows);
+            let mut bytes = Vec::new();
+            built.write_built(&updates, &mut bytes).expect("bytes");
+            let read = PartUpdates::read(&mut Cursor::new(&bytes));
+            assert!(matches!(read, Err(PartsError::Damaged { .. })), "{what}");
+        }
+    }
+}

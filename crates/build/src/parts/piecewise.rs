@@ -1,0 +1,583 @@
+//! The parts of a mesh that comes in pieces: of the whole no more is in memory than a piece or a part at a time, and what is known of the
+//! points at which pieces meet.
+//!
+//! The parts are those that [`part`](super::part) makes of the whole, byte for byte. What several passes need lies in a [`Scratch`].
+
+use super::PartsError;
+use super::fragments::{Band, Fragments, PieceParts};
+use super::partition::{CUT_BITS, best_cut, between, shared_faces, shift};
+use super::piece::{Head, Part};
+use super::plan::{MOST_PARTS, Node, Plan};
+use crate::lattice::field_lattice;
+use crate::lattice::field_selection;
+use crate::lattice::location::{self, Location};
+use crate::lattice::position_lattice::{self, Placed};
+use crate::lattice::quantize::{self, Quantized};
+use crate::restrict::restrictions::Restrictions;
+use crate::{BuildConfig, BuildError, Construction, Purpose};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io;
+use tetralod::geom::{Bounds, Lattice, WIDE_BITS, orient3d};
+use tetralod::mesh::{FACES, Field, MAX_TETS, MeshInput, MeshPiece, TetMesh};
+use tetralod::mt::{FieldInfo, MAX_UPDATES};
+
+/// Where [`Piecewise`] puts what it does not keep in memory, by names of letters, digits and dashes.
+pub trait Scratch {
+    /// Keeps bytes under a name.
+    ///
+    /// # Errors
+    /// If they cannot be kept.
+    fn write(&mut self, name: &str, bytes: &[u8]) -> io::Result<()>;
+
+    /// The bytes of a name.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    fn read(&self, name: &str) -> io::Result<Vec<u8>>;
+
+    /// Forgets a name.
+    ///
+    /// # Errors
+    /// If that fails.
+    fn remove(&mut self, name: &str) -> io::Result<()>;
+}
+
+/// A mesh that is parted piece by piece.
+pub struct Piecewise<'a> {
+    config: &'a BuildConfig,
+    purpose: Purpose,
+    parts: u32,
+    scratch: &'a mut dyn Scratch,
+    pieces: u32,
+    sums: Sums,
+}
+
+/// What is known of all pieces so far.
+struct Sums {
+    bounds: Bounds,
+    points: u32,
+    tets: u64,
+    /// The fields with their least and largest values alone.
+    fields: Vec<Field>,
+    cell_fields: Vec<Field>,
+    /// Fields that nobody asked for, as the first piece has them.
+    input: MeshInput,
+    /// Points that are in several pieces.
+    shared: Vec<u32>,
+    /// Points that no tetrahedron of the first piece that has them uses, and shared points that one of a later piece uses.
+    unused: Vec<u32>,
+    used: Vec<u32>,
+    /// Of positions, tetrahedra, and each field.
+    hashers: [crc32fast::Hasher; 2],
+    of_fields: Vec<crc32fast::Hasher>,
+}
+
+/// A piece as it lies in the scratch.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Stored {
+    pub points: Vec<u32>,
+    pub positions: Vec<[f64; 3]>,
+    /// Field by field.
+    pub values: Vec<Vec<f64>>,
+    pub tets: Vec<[u32; 4]>,
+}
+
+/// What is the same for all pieces, once the lattices are known.
+pub(super) struct Whole {
+    pub lattice: Lattice,
+    /// Numbers of the chosen fields.
+    pub chosen: Vec<usize>,
+    pub fields: Vec<FieldInfo>,
+    /// Points that are in several pieces, ascending.
+    pub shared: Vec<u32>,
+    /// Level by level and half by half the axis of a cut and the first place behind it.
+    pub cuts: Vec<Vec<(usize, usize)>>,
+}
+
+/// Why pieces have to be put together first.
+fn whole<T>(why: &'static str) -> Result<T, PartsError> {
+    Err(PartsError::NeedsWhole { why })
+}
+
+impl<'a> Piecewise<'a> {
+    /// Begins.
+    ///
+    /// # Errors
+    /// If `config` is not of half-edge MTs, or there is no such number of parts; [`PartsError::NeedsWhole`] if it asks for what only a whole
+    /// mesh tells.
+    pub fn new(
+        config: &'a BuildConfig,
+        parts: u32,
+        scratch: &'a mut dyn Scratch,
+    ) -> Result<Self, PartsError> {
+        let Construction::HalfEdge { purpose } = config.construction else { return Err(PartsError::Kind) };
+        if !parts.is_power_of_two() || parts > MOST_PARTS {
+            return Err(PartsError::Count { parts });
+        }
+        if !config.preserve.is_empty() || !config.keep_points.is_empty() {
+            return whole("regions and single points are kept");
+        }
+        if config.position_tolerance.is_some() || field_lattice::has_tolerance(config) {
+            return whole("a tolerance is given");
+        }
+        let sums = Sums {
+            bounds: Bounds::of(&[]),
+            points: 0,
+            tets: 0,
+            fields: Vec::new(),
+            cell_fields: Vec::new(),
+            input: MeshInput::default(),
+            shared: Vec::new(),
+            unused: Vec::new(),
+            used: Vec::new(),
+            hashers: Default::default(),
+            of_fields: Vec::new(),
+        };
+        Ok(Self { config, purpose, parts, scratch, pieces: 0, sums })
+    }
+
+    /// Takes the next piece.
+    ///
+    /// # Errors
+    /// [`PartsError::NeedsWhole`] if it needs repair, or more than fits together; if it cannot be kept.
+    pub fn add(&mut self, piece: MeshPiece) -> Result<(), PartsError> {
+        let MeshPiece { points, mesh } = piece;
+        if !mesh.tets.is_empty() && tetralod::mesh::check(&mesh).is_err() {
+            return whole("its cells need repair");
+        }
+        let sums = &mut self.sums;
+        let first = sums.points;
+        let mut used = vec![false; points.len()];
+        mesh.tets.iter().flatten().for_each(|&v| used[v as usize] = true);
+        for (&number, used) in points.iter().zip(used) {
+            match (number >= first, used) {
+                (true, true) => {}
+                (true, false) => sums.unused.push(number),
+                (false, used) => {
+                    sums.shared.push(number);
+                    sums.used.extend(used.then_some(number));
+                }
+            }
+        }
+        if self.pieces == 0 {
+            let bare = |field: &Field| Field { values: Vec::new(), ..field.clone() };
+            sums.fields = mesh.fields.iter().map(bare).collect();
+            sums.cell_fields = mesh.cell_fields.iter().map(bare).collect();
+            sums.input.other_fields.clone_from(&mesh.input.other_fields);
+            sums.input.other_cell_fields.clone_from(&mesh.input.other_cell_fields);
+            sums.of_fields = mesh.fields.iter().map(|_| crc32fast::Hasher::new()).collect();
+        }
+        let is_new = |i: &usize| points[*i] >= first;
+        let new: Vec<usize> = (0..points.len()).filter(is_new).collect();
+        for &i in &new {
+            sums.bounds = sums.bounds.with(mesh.positions[i]);
+            mesh.positions[i].iter().for_each(|x| sums.hashers[0].update(&x.to_le_bytes()));
+        }
+        mesh.tets.iter().flatten().for_each(|&v| sums.hashers[1].update(&points[v as usize].to_le_bytes()));
+        for ((sum, field), hasher) in sums.fields.iter_mut().zip(&mesh.fields).zip(&mut sums.of_fields) {
+            let values = || new.iter().map(|&i| field.values[i]);
+            if !values().all(f64::is_finite) {
+                return whole("values are not finite");
+            }
+            values().for_each(|x| hasher.update(&x.to_le_bytes()));
+            let ends = sum.values.iter().copied().chain(values());
+            let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+            sum.integer &= field.integer && values().all(|x| field_lattice::is_exact_integer(&x));
+            if low <= high {
+                sum.values = vec![low, high];
+            }
+        }
+        let end = u64::from(first) + new.len() as u64;
+        sums.tets += mesh.tets.len() as u64;
+        if end > u64::from(MAX_UPDATES) || sums.tets > MAX_TETS as u64 {
+            return Err(BuildError::TooLarge.into());
+        }
+        sums.points = end as u32;
+        let TetMesh { positions, fields, tets, .. } = mesh;
+        let values = fields.into_iter().map(|field| field.values).collect();
+        let index = self.pieces;
+        self.pieces += 1;
+        self.keep(&format!("piece-{index}"), &Stored { points, positions, values, tets })
+    }
+
+    /// Parts what was added, as [`part`](super::part).
+    ///
+    /// # Errors
+    /// As [`part`](super::part), and [`PartsError::NeedsWhole`] if pieces do not fit each other.
+    pub fn part(
+        mut self,
+        metadata: BTreeMap<String, String>,
+        put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
+    ) -> Result<Plan, PartsError> {
+        if self.sums.tets == 0 {
+            return Err(BuildError::Empty.into());
+        }
+        let shared = self.shared()?;
+        let mock = TetMesh {
+            fields: self.sums.fields.clone(),
+            cell_fields: self.sums.cell_fields.clone(),
+            input: self.sums.input.clone(),
+            ..TetMesh::default()
+        };
+        let fields = field_selection::fields(&mock, self.config)?;
+        let number = |field: &&Field| mock.fields.iter().position(|known| std::ptr::eq(known, *field));
+        let chosen: Vec<usize> = fields.iter().filter_map(number).collect();
+        let infos = field_lattice::field_lattices(&fields, self.config)?;
+        let lattice = self.lattice()?;
+        let mut whole = Whole { lattice, chosen, fields: infos, shared, cuts: Vec::new() };
+        self.check_interfaces(&whole)?;
+        let (band, quantization) = self.refined(&mut whole)?;
+        self.cut(&mut whole)?;
+        let plan = self.plan(&whole, quantization, metadata)?;
+        let fragments = self.fragments(&whole, band)?;
+        for index in 0..self.parts {
+            let head = Head { plan: plan.clone(), node: Node { level: 0, index }, built: false };
+            let piece = fragments.piece(index, |name| self.kept(name))?;
+            for name in fragments.names(index) {
+                self.scratch.remove(&name)?;
+            }
+            put(Part { head, piece })?;
+        }
+        for index in 0..self.pieces {
+            self.scratch.remove(&format!("piece-{index}"))?;
+        }
+        Ok(plan)
+    }
+
+    fn keep<T: Serialize>(&mut self, name: &str, value: &T) -> Result<(), PartsError> {
+        let bytes =
+            postcard::to_stdvec(value).map_err(|_| PartsError::Damaged { what: "it cannot be written" })?;
+        Ok(self.scratch.write(name, &bytes)?)
+    }
+
+    fn kept<T: DeserializeOwned>(&self, name: &str) -> Result<T, PartsError> {
+        let bytes = self.scratch.read(name)?;
+        postcard::from_bytes(&bytes).map_err(|_| PartsError::Damaged { what: "its content is another one" })
+    }
+
+    fn stored(&self, index: u32) -> Result<Stored, PartsError> {
+        self.kept(&format!("piece-{index}"))
+    }
+
+    /// The points of several pieces, ascending. Each point must be used.
+    fn shared(&mut self) -> Result<Vec<u32>, PartsError> {
+        let Sums { shared, unused, used, .. } = &mut self.sums;
+        let mut shared = std::mem::take(shared);
+        shared.sort_unstable();
+        shared.dedup();
+        let mut used = std::mem::take(used);
+        used.sort_unstable();
+        if unused.iter().any(|number| used.binary_search(number).is_err()) {
+            return whole("some points belong to no cell");
+        }
+        Ok(shared)
+    }
+
+    /// Where pieces meet, a face must have at most two tetrahedra, one on each side.
+    fn check_interfaces(&self, of: &Whole) -> Result<(), PartsError> {
+        let mut faces: Vec<([u32; 3], bool)> = Vec::new();
+        for index in 0..self.pieces {
+            let Stored { points, tets, .. } = self.stored(index)?;
+            let is_shared = of.are_shared(&points);
+            for tet in tets.iter().filter(|tet| tet.iter().filter(|&&v| is_shared[v as usize]).count() > 2) {
+                for corners in FACES.map(|face| face.map(|k| tet[k])) {
+                    if corners.iter().all(|&v| is_shared[v as usize]) {
+                        let [a, b, c] = corners.map(|v| points[v as usize]);
+                        let mut face = [a, b, c];
+                        face.sort_unstable();
+                        faces.push((face, (a > b) ^ (b > c) ^ (a > c)));
+                    }
+                }
+            }
+        }
+        faces.sort_unstable();
+        let fits = |group: &[([u32; 3], bool)]| match group {
+            [_] => true,
+            [a, b] => a.1 != b.1,
+            _ => false,
+        };
+        if faces.chunk_by(|a, b| a.0 == b.0).all(fits) { Ok(()) } else { whole("its pieces overlap") }
+    }
+
+    /// The lattice over all pieces, as of the whole.
+    fn lattice(&self) -> Result<Lattice, PartsError> {
+        let of = |bits: u32| position_lattice::over(&self.sums.bounds, bits);
+        if position_lattice::check_scale(&of(WIDE_BITS)).is_err() {
+            return whole("its coordinates are too small or too large");
+        }
+        if let Some(bits) = self.config.position_bits {
+            let is_known = (1..=WIDE_BITS).contains(&bits);
+            return if is_known && self.fits(&of(bits))? {
+                Ok(of(bits))
+            } else {
+                whole("its lattice is refused")
+            };
+        }
+        let mut found = None;
+        for bits in position_lattice::FEWEST_BITS..=WIDE_BITS {
+            if self.fits(&of(bits))? {
+                found = Some(bits);
+                break;
+            }
+        }
+        let Some(bits) = found else { return whole("its cells are too thin") };
+        let finer = bits + position_lattice::SPARE_BITS;
+        if bits == position_lattice::FEWEST_BITS || finer > WIDE_BITS || !self.fits(&of(finer))? {
+            return Ok(of(bits));
+        }
+        Ok(of(finer))
+    }
+
+    /// Whether all cells are positive on a lattice.
+    fn fits(&self, lattice: &Lattice) -> Result<bool, PartsError> {
+        for index in 0..self.pieces {
+            let Stored { positions, tets, .. } = self.stored(index)?;
+            let placed: Vec<[i32; 3]> = positions.iter().map(|&p| lattice.nearest(p)).collect();
+            let positive = |tet: &[u32; 4]| {
+                let [a, b, c, d] = tet.map(|v| placed[v as usize]);
+                orient3d(a, b, c, d) > 0
+            };
+            if !tets.iter().all(positive) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Makes the lattice finer where cells are thin for what varies across them, and notes what it rounds off; returns what has to be
+    /// located beyond pieces, and how far the lattice moves a point at most.
+    fn refined(&self, of: &mut Whole) -> Result<(Band, f64), PartsError> {
+        let mut rounded = vec![0.0_f64; of.fields.len()];
+        for index in 0..self.pieces {
+            let stored = self.stored(index)?;
+            for ((&number, info), most) in of.chosen.iter().zip(&of.fields).zip(&mut rounded) {
+                let losses = stored.values[number].iter().map(|&value| field_lattice::loss(info, value));
+                *most = losses.fold(*most, f64::max);
+            }
+        }
+        of.fields.iter_mut().zip(rounded).for_each(|(field, loss)| field.quantization = loss);
+        let is_free = self.config.position_bits.is_none();
+        let (mut band, mut quantization, mut losses) = self.measured(of)?;
+        while is_free && quantize::is_large(&losses, &of.fields) {
+            let finer = position_lattice::over(&self.sums.bounds, of.lattice.bits + quantize::FINER_BITS);
+            if finer.bits > WIDE_BITS || !self.fits(&finer)? {
+                break;
+            }
+            of.lattice = finer;
+            (band, quantization, losses) = self.measured(of)?;
+        }
+        for (field, loss) in of.fields.iter_mut().zip(losses) {
+            field.quantization = field.quantization.max(loss * field.range());
+        }
+        Ok((band, quantization))
+    }
+
+    /// What the lattice loses.
+    fn measured(&self, of: &Whole) -> Result<(Band, f64, Vec<f64>), PartsError> {
+        let (mut losses, mut quantization) = (vec![0.0_f64; of.fields.len()], 0.0_f64);
+        let mut add = |quantized: &Quantized, tets: &[[u32; 4]]| {
+            quantization = quantization.max(quantized.quantization);
+            losses.iter_mut().zip(quantized.losses(tets)).for_each(|(most, loss)| *most = most.max(loss));
+        };
+        let mut beyond = Vec::new();
+        for index in 0..self.pieces {
+            let stored = self.stored(index)?;
+            let prepared = Prepared::of(of, stored)?;
+            add(&prepared.quantized, &prepared.mesh.tets);
+            let positions = &prepared.quantized.positions;
+            beyond.extend(
+                prepared.beyond.iter().map(|&v| (prepared.points[v as usize], positions[v as usize])),
+            );
+        }
+        beyond.sort_unstable();
+        beyond.dedup();
+        let mut band = Band::new(beyond);
+        let mut first = 0;
+        for index in 0..self.pieces {
+            if band.is_empty() {
+                break;
+            }
+            let stored = self.stored(index)?;
+            let count = stored.tets.len() as u32;
+            band.add(&stored, &of.lattice, first);
+            first += count;
+        }
+        band.locate(of)?;
+        if let Some(quantized) = &band.quantized {
+            add(quantized, &band.mesh.tets);
+        }
+        Ok((band, quantization, losses))
+    }
+
+    /// Cuts the pieces as the whole is cut.
+    fn cut(&mut self, of: &mut Whole) -> Result<(), PartsError> {
+        let shift = shift(of.lattice.bits);
+        for index in 0..self.pieces {
+            let Stored { positions, tets, .. } = self.stored(index)?;
+            let places: Vec<[u16; 3]> = places(&positions, &tets, &of.lattice, shift);
+            self.keep(&format!("places-{index}"), &places)?;
+        }
+        for level in 0..self.parts.ilog2() {
+            let now = 1_usize << level;
+            let mut spans = vec![[[usize::MAX, 0]; 3]; now];
+            let mut counts = vec![[const { Vec::new() }; 3]; now];
+            counts.iter_mut().flatten().for_each(|all| *all = vec![0_u32; 1 << CUT_BITS]);
+            for index in 0..self.pieces {
+                let places: Vec<[u16; 3]> = self.kept(&format!("places-{index}"))?;
+                for place in places {
+                    let part = usize::from(of.part_of(place));
+                    for axis in 0..3 {
+                        let x = usize::from(place[axis]);
+                        let [low, high] = &mut spans[part][axis];
+                        (*low, *high) = ((*low).min(x), (*high).max(x));
+                        counts[part][axis][x] += 1;
+                    }
+                }
+            }
+            let step = of.lattice.step;
+            let cuts: Option<Vec<(usize, usize)>> =
+                spans.iter().zip(&counts).map(|(spans, counts)| best_cut(spans, counts, step)).collect();
+            let too_many = PartsError::TooMany { parts: self.parts, tetrahedra: self.sums.tets };
+            of.cuts.push(cuts.ok_or(too_many)?);
+        }
+        for index in 0..self.pieces {
+            self.scratch.remove(&format!("places-{index}"))?;
+        }
+        Ok(())
+    }
+
+    fn plan(
+        &self,
+        of: &Whole,
+        quantization: f64,
+        metadata: BTreeMap<String, String>,
+    ) -> Result<Plan, PartsError> {
+        let Sums { bounds, points, tets, hashers: [positions, cells], of_fields, .. } = &self.sums;
+        let alone = quantize::lattices_alone(of.lattice, of.fields.clone(), quantization);
+        Restrictions::of_angles(self.config, &alone)?;
+        let mut info = alone.info(*tets as usize, self.config.displacement * bounds.diagonal());
+        info.vertices = *points;
+        let mut checksum = positions.clone();
+        checksum.combine(cells);
+        of_fields.iter().for_each(|hasher| checksum.combine(hasher));
+        // The lattice begins at the least corner.
+        let [low, high] = [bounds.min, bounds.max].map(|p| of.lattice.nearest(p));
+        let sides = [0, 1, 2].map(|k| high[k] - low[k]);
+        let whole = (self.parts, checksum.finalize(), sides);
+        Ok(Plan::new(&info, self.config, self.purpose, whole, metadata))
+    }
+
+    /// Sorts all pieces into the parts.
+    fn fragments(&mut self, of: &Whole, mut band: Band) -> Result<Fragments, PartsError> {
+        // What several pieces tell of the points that they share.
+        let mut ends = vec![[u16::MAX, 0]; of.shared.len()];
+        let mut shortest = vec![f64::INFINITY; of.shared.len()];
+        let mut faces = Vec::new();
+        for index in 0..self.pieces {
+            let parts = PieceParts::of(of, self.stored(index)?)?;
+            for (v, number) in parts.prepared.points.iter().enumerate() {
+                if let Ok(at) = of.shared.binary_search(number) {
+                    let [first, last] = parts.ends[v];
+                    ends[at] = [ends[at][0].min(first), ends[at][1].max(last)];
+                    shortest[at] = shortest[at].min(parts.shortest[v]);
+                }
+            }
+        }
+        let mut fragments = Fragments::new(self.parts, of.fields.len());
+        for index in 0..self.pieces {
+            let mut parts = PieceParts::of(of, self.stored(index)?)?;
+            for (v, number) in parts.prepared.points.iter().enumerate() {
+                if let Ok(at) = of.shared.binary_search(number) {
+                    (parts.ends[v], parts.shortest[v]) = (ends[at], shortest[at]);
+                }
+            }
+            let points = &parts.prepared.points;
+            let global: Vec<[u32; 4]> =
+                parts.prepared.mesh.tets.iter().map(|tet| tet.map(|v| points[v as usize])).collect();
+            let is_between = |i: usize, k: usize| {
+                let [first, last] = parts.ends[parts.prepared.mesh.tets[i][k] as usize];
+                first != last
+            };
+            shared_faces(&global, &parts.part_of, is_between, &mut faces);
+            fragments.sort_in(index, &parts, &mut band, &mut |name, fragment| self.keep(name, fragment))?;
+        }
+        fragments.interface = between(faces)?;
+        fragments.add_band(of, &band);
+        Ok(fragments)
+    }
+}
+
+/// The least place of each tetrahedron along each axis, as far as it decides on cuts.
+fn places(positions: &[[f64; 3]], tets: &[[u32; 4]], lattice: &Lattice, shift: u32) -> Vec<[u16; 3]> {
+    let placed: Vec<[i32; 3]> = positions.iter().map(|&p| lattice.nearest(p)).collect();
+    let least = |tet: &[u32; 4], axis: usize| {
+        let least = tet.iter().map(|&v| placed[v as usize][axis]).min();
+        (least.unwrap_or(0) >> shift) as u16
+    };
+    tets.iter().map(|tet| [0, 1, 2].map(|axis| least(tet, axis))).collect()
+}
+
+impl Whole {
+    /// The part of a tetrahedron at a place.
+    pub fn part_of(&self, place: [u16; 3]) -> u16 {
+        self.cuts.iter().fold(0, |part, cuts| {
+            let (axis, first) = cuts[usize::from(part)];
+            2 * part + u16::from(usize::from(place[axis]) >= first)
+        })
+    }
+
+    /// The parts of tetrahedra.
+    pub fn parts_of(&self, positions: &[[f64; 3]], tets: &[[u32; 4]]) -> Vec<u16> {
+        let places = places(positions, tets, &self.lattice, shift(self.lattice.bits));
+        places.into_iter().map(|place| self.part_of(place)).collect()
+    }
+
+    pub fn are_shared(&self, points: &[u32]) -> Vec<bool> {
+        points.iter().map(|number| self.shared.binary_search(number).is_ok()).collect()
+    }
+
+    /// A mesh of some of the whole, with the chosen fields, on the lattices; without locations.
+    pub fn quantized(&self, mesh: &TetMesh) -> Quantized {
+        let positions = mesh.positions.iter().map(|&p| self.lattice.nearest(p)).collect();
+        let placed = Placed { lattice: self.lattice, positions };
+        let chosen: Vec<&Field> = mesh.fields.iter().collect();
+        quantize::on_lattices(mesh, placed, &chosen, self.fields.clone())
+    }
+
+    /// The chosen fields.
+    pub fn fields_of(&self, mut values: Vec<Vec<f64>>) -> Vec<Field> {
+        let taken = self.chosen.iter().map(|&number| std::mem::take(&mut values[number]));
+        self.fields.iter().zip(taken).map(|(info, values)| Field::new(info.name.clone(), values)).collect()
+    }
+}
+
+/// A piece on the lattices.
+pub(super) struct Prepared {
+    pub points: Vec<u32>,
+    pub mesh: TetMesh,
+    /// With the locations that the piece alone tells.
+    pub quantized: Quantized,
+    /// Points that may lie in a tetrahedron of another piece.
+    pub beyond: Vec<u32>,
+}
+
+impl Prepared {
+    pub fn of(whole: &Whole, stored: Stored) -> Result<Self, PartsError> {
+        let Stored { points, positions, values, tets } = stored;
+        let mesh = TetMesh { positions, fields: whole.fields_of(values), tets, ..TetMesh::default() };
+        let mut quantized = whole.quantized(&mesh);
+        let is_shared = whole.are_shared(&points);
+        let (locations, beyond): (Vec<Location>, Vec<u32>) =
+            location::locations_in_piece(&mesh.tets, &quantized.positions, &quantized.places, &is_shared)
+                .map_err(BuildError::from)?;
+        quantized.locations = locations;
+        Ok(Self { points, mesh, quantized, beyond })
+    }
+
+    /// For each point the square of the shortest edge there.
+    pub fn shortest(&self) -> Vec<f64> {
+        self.quantized.shortest_edges(&self.mesh.tets)
+    }
+}

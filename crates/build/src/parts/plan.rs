@@ -1,0 +1,246 @@
+//! What all steps know of the whole.
+
+use super::PartsError;
+use super::piece::Head;
+use super::wire::{read_frame, read_magic};
+use crate::{BuildConfig, Purpose};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::ops::Range;
+use tetralod::geom::Lattice;
+use tetralod::mesh::VectorPart;
+use tetralod::mt::{FieldInfo, MtInfo, MtKind};
+
+/// Most parts of a plan.
+pub const MOST_PARTS: u32 = 4096;
+
+/// So many parts are joined at a time: halves along each of three axes.
+const JOINED: u32 = 8;
+
+/// What is made by one step: at level 0 the parts, numbered so that those that are joined follow one another; above them what each
+/// eight of the level below become.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Node {
+    /// The level, 0 for the parts.
+    pub level: u32,
+    /// The number in its level, from 0.
+    pub index: u32,
+}
+
+impl Node {
+    /// The first of the nodes of the level below that make this one; none make the parts.
+    pub fn first_child(self) -> Option<Self> {
+        Some(Self { level: self.level.checked_sub(1)?, index: self.index.saturating_mul(JOINED) })
+    }
+}
+
+/// How a volume is parted, and all that the steps have to know of the whole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    pub(super) parts: u32,
+    /// The checksum of the input, so that parts of different inputs are told apart.
+    pub(super) input: u32,
+    pub(super) lattice: ([f64; 3], [f64; 3], u32),
+    /// The sides of the domain, in its steps.
+    pub(super) sides: [i32; 3],
+    pub(super) fields: Vec<PlanField>,
+    /// Reference vertices and tetrahedra of the whole.
+    pub(super) counts: [u32; 2],
+    pub(super) displacement_per_error: f64,
+    pub(super) displacement_edges: f64,
+    pub(super) quantization: f64,
+    /// The least dihedral angle and the angle of features, in degrees.
+    pub(super) angles: [Option<f64>; 2],
+    /// Whether regions are kept apart.
+    pub(super) has_regions: bool,
+    pub(super) for_regions: bool,
+    pub(super) for_mean: bool,
+    pub(super) block_bits: u32,
+    pub(super) metadata: BTreeMap<String, String>,
+}
+
+/// A field of the whole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct PlanField {
+    name: String,
+    range: [f64; 2],
+    lattice: (f64, f64, u32),
+    unit: String,
+    vector: Option<(String, Option<u8>)>,
+    time: Option<f64>,
+    quantization: f64,
+    /// Whether its exact values are kept.
+    pub lossless: bool,
+}
+
+impl PlanField {
+    pub fn new(field: &FieldInfo, lossless: bool) -> Self {
+        Self {
+            name: field.name.clone(),
+            range: [field.min, field.max],
+            lattice: (field.origin, field.step, field.bits),
+            unit: field.unit.clone(),
+            vector: field.vector.as_ref().map(|vector| (vector.name.clone(), vector.component)),
+            time: field.time,
+            quantization: field.quantization,
+            lossless,
+        }
+    }
+
+    fn info(&self) -> FieldInfo {
+        let vector = self.vector.as_ref();
+        let (origin, step, bits) = self.lattice;
+        FieldInfo {
+            name: self.name.clone(),
+            min: self.range[0],
+            max: self.range[1],
+            origin,
+            step,
+            bits,
+            unit: self.unit.clone(),
+            vector: vector.map(|(name, component)| VectorPart { name: name.clone(), component: *component }),
+            time: self.time,
+            quantization: self.quantization,
+        }
+    }
+}
+
+impl Plan {
+    pub(super) fn new(
+        info: &MtInfo,
+        config: &BuildConfig,
+        purpose: Purpose,
+        (parts, input, sides): (u32, u32, [i32; 3]),
+        metadata: BTreeMap<String, String>,
+    ) -> Self {
+        let is_lossless = |field: &FieldInfo| {
+            let of_vector = |name: &String| field.vector.as_ref().is_some_and(|vector| vector.name == *name);
+            config.all_lossless || config.lossless.iter().any(|name| field.name == *name || of_vector(name))
+        };
+        let Lattice { origin, step, bits } = info.lattice;
+        Self {
+            parts,
+            input,
+            lattice: (origin, step, bits),
+            sides,
+            fields: info.fields.iter().map(|field| PlanField::new(field, is_lossless(field))).collect(),
+            counts: [info.vertices, info.tetrahedra],
+            displacement_per_error: info.displacement_per_error,
+            displacement_edges: config.displacement_edges,
+            quantization: info.quantization,
+            angles: [config.min_dihedral, config.feature_angle],
+            has_regions: !config.preserve.is_empty(),
+            for_regions: purpose == Purpose::Regions,
+            for_mean: purpose == Purpose::Mean,
+            block_bits: config.block_bits.clamp(4, 16),
+            metadata,
+        }
+    }
+
+    /// Reads the plan that a part belongs to, and no more of it.
+    ///
+    /// # Errors
+    /// If `input` fails, or holds no part.
+    pub fn read(input: &mut dyn Read) -> Result<Self, PartsError> {
+        read_magic(input)?;
+        let head: Head = read_frame(input)?;
+        Ok(head.plan)
+    }
+
+    /// How many parts there are.
+    pub fn parts(&self) -> u32 {
+        self.parts
+    }
+
+    /// The points and tetrahedra of the whole.
+    pub fn counts(&self) -> [u64; 2] {
+        self.counts.map(u64::from)
+    }
+
+    /// What the file is to say of itself, as it was given to [`part`](super::part).
+    pub fn metadata(&self) -> &BTreeMap<String, String> {
+        &self.metadata
+    }
+
+    /// log2 of the updates of a block.
+    pub fn block_bits(&self) -> u32 {
+        self.block_bits
+    }
+
+    /// How many nodes each level has; the last one has one.
+    pub fn levels(&self) -> Vec<u32> {
+        let above = |&nodes: &u32| (nodes > 1).then(|| nodes.div_ceil(JOINED));
+        std::iter::successors(Some(self.parts), above).collect()
+    }
+
+    /// All nodes, coarse to fine: the last one to be joined first.
+    pub fn nodes(&self) -> Vec<Node> {
+        let levels = self.levels();
+        let of_level =
+            |level: usize| (0..levels[level]).map(move |index| Node { level: level as u32, index });
+        (0..levels.len()).rev().map(of_level).fold(Vec::new(), |mut all, nodes| {
+            all.extend(nodes);
+            all
+        })
+    }
+
+    /// The nodes of the level below that make a node.
+    ///
+    /// # Errors
+    /// If there is no such node; if it is of level 0.
+    pub fn children(&self, node: Node) -> Result<Vec<Node>, PartsError> {
+        let levels = self.levels();
+        let Some(level) = node.level.checked_sub(1).filter(|_| self.has(node)) else {
+            return Err(PartsError::NoNode { level: node.level, index: node.index });
+        };
+        let last = ((node.index + 1) * JOINED).min(levels[level as usize]);
+        Ok((node.index * JOINED..last).map(|index| Node { level, index }).collect())
+    }
+
+    pub(super) fn has(&self, node: Node) -> bool {
+        self.levels().get(node.level as usize).is_some_and(|&nodes| node.index < nodes)
+    }
+
+    /// Whether a node is the last one to be joined.
+    pub(super) fn is_whole(&self, node: Node) -> bool {
+        node.level as usize + 1 == self.levels().len()
+    }
+
+    /// The parts that a node consists of.
+    pub(super) fn parts_of(&self, node: Node) -> Range<u32> {
+        let each = JOINED.saturating_pow(node.level);
+        let first = node.index.saturating_mul(each);
+        first..self.parts.min(first.saturating_add(each))
+    }
+
+    /// What is known of the MT; not how many updates it has.
+    pub(super) fn info(&self) -> MtInfo {
+        let (origin, step, bits) = self.lattice;
+        MtInfo {
+            kind: MtKind::HalfEdge,
+            lattice: Lattice { origin, step, bits },
+            fields: self.fields.iter().map(PlanField::info).collect(),
+            vertices: self.counts[0],
+            tetrahedra: self.counts[1],
+            updates: 0,
+            displacement_per_error: self.displacement_per_error,
+            quantization: self.quantization,
+            bounds: None,
+        }
+    }
+
+    /// By which angles the mesh is restricted. Regions and points that stay come with the parts.
+    pub(super) fn restricting(&self) -> BuildConfig {
+        let [min_dihedral, feature_angle] = self.angles;
+        BuildConfig { min_dihedral, feature_angle, ..BuildConfig::default() }
+    }
+
+    pub(super) fn purpose(&self) -> Purpose {
+        match (self.for_regions, self.for_mean) {
+            (true, _) => Purpose::Regions,
+            (false, true) => Purpose::Mean,
+            (false, false) => Purpose::Uniform,
+        }
+    }
+}

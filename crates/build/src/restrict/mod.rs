@@ -1,0 +1,5 @@
+//! What must stay beside what a valid mesh needs: regions, their interfaces, points, angles of cells.
+
+pub(crate) mod interface;
+pub(crate) mod preserve;
+pub(crate) mod restrictions;

@@ -1,0 +1,458 @@
+//! Verification of single requests, for MTs of which not all is in memory: each is checked against the input near it alone.
+
+use super::deviation::Deviation;
+use super::history::Numbers;
+use super::mesh_checks::{PlainMesh, PlainReference, Shape};
+use super::queries::Query;
+use super::{Case, VerifyReport, fresh, note, satisfy};
+use glam::DVec3;
+use std::collections::BTreeSet;
+use tetralod::geom::{Bounds, LatticeBox, tet_meets_box};
+use tetralod::mesh::{FACES, Field, Grid, NONE, TetMesh, boundary_faces, kuhn_tets, neighbors};
+use tetralod::mt::{ApplyUpdates, MtInfo, mix};
+use tetralod::refine::{Need, Part, Region, Request};
+
+/// A request that an MT is tried with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleRequest {
+    /// What it is, in words.
+    pub name: String,
+    /// The request.
+    pub request: Request,
+}
+
+/// A box has about so many tetrahedra of the reference mesh.
+const BOX_TETS: f64 = 20_000.0;
+/// The errors of boxes, one after the other.
+const ERRORS: [f64; 4] = [0.0, 0.01, 0.001, 0.0];
+/// One in so many requests is for values in a box.
+const VALUES_EVERY: usize = 4;
+/// Errors are measured at about so many reference vertices for each request.
+const VERTICES: usize = 20_000;
+
+/// So many requests for an MT of `input`, a mesh or a [grid alone](TetMesh::of_grid_alone): the whole domain within the error `coarse`,
+/// which should be one of a mesh that fits into memory, then boxes all over it, exactly or with an error, and values in boxes. They
+/// follow from the input and `count` alone.
+pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec<SampleRequest> {
+    let whole = bounds(input);
+    let mut numbers = Numbers(0x5DEE_CE66_D1CE_4E5B);
+    let part = (BOX_TETS / f64::from(info.tetrahedra.max(1))).min(1.0).cbrt();
+    let mut all =
+        vec![SampleRequest { name: format!("everywhere, error {coarse}"), request: Request::within(coarse) }];
+    while all.len() < count {
+        let i = all.len();
+        let mut inside = whole;
+        for k in 0..3 {
+            let length = part * (whole.max[k] - whole.min[k]);
+            // A box now and then sticks out, so that there is boundary in it.
+            let low = whole.min[k] - 0.5 * length + numbers.part() * (whole.max[k] - whole.min[k]);
+            (inside.min[k], inside.max[k]) = (low, low + length);
+        }
+        let error = ERRORS[i % ERRORS.len()];
+        let need = Need::within(error).inside(inside);
+        let (what, need) = if i % VALUES_EVERY == 0 {
+            let field = i / VALUES_EVERY % info.fields.len().max(1);
+            let value = info.fields[field].min + numbers.part() * info.fields[field].range();
+            (format!("{} = {value} in a box", info.fields[field].name), need.around(field, &[value]))
+        } else {
+            ("box".to_owned(), need)
+        };
+        let name = format!("{what} {:?} to {:?}, error {error}", inside.min, inside.max);
+        all.push(SampleRequest { name, request: need.into() });
+    }
+    all.truncate(count);
+    all
+}
+
+/// Checks the mesh of one request against `input`, what the MT was built from, or a [grid alone](TetMesh::of_grid_alone): that it is
+/// valid and conforming and has the topology of the base mesh, that all errors are within their bounds, where they are measured, that the
+/// answer is true, and that coarsening leads back to the base mesh. In a box with error 0 the tetrahedra must be those of the input; in
+/// any box in which the boundary cannot have moved their volumes must add up. `mt` needs to have only what the request needs.
+pub fn run_request<M: ApplyUpdates>(mt: &M, input: &TetMesh, sample: &SampleRequest) -> VerifyReport {
+    let mut report = VerifyReport::default();
+    if let Err(failure) = check(mt, input, sample, &mut report) {
+        report.failures.push(failure);
+    }
+    report.valid = report.failures.is_empty();
+    report
+}
+
+fn check<M: ApplyUpdates>(
+    mt: &M,
+    input: &TetMesh,
+    sample: &SampleRequest,
+    report: &mut VerifyReport,
+) -> Result<(), String> {
+    let info = mt.info();
+    let counts = [u64::from(info.vertices), u64::from(info.tetrahedra)];
+    if input.counts() != counts {
+        let [points, tets] = input.counts();
+        return Err(format!(
+            "the MT was built from {} vertices and {} tetrahedra, the input has {points} and {tets}: give the mesh that it was \
+             built from",
+            counts[0], counts[1]
+        ));
+    }
+    let query = Query::new(&sample.name, sample.request.clone());
+    let around = match &query.request.needs[..] {
+        [need] => region(need).map(|inside| (inside, need)),
+        _ => None,
+    };
+    let most = if around.is_some() { VERTICES } else { usize::MAX };
+    let near = match around {
+        Some((inside, need)) => {
+            let away = need.error.min(1.0) * info.displacement_per_error;
+            let wide = Bounds { min: inside.min.map(|x| x - away), max: inside.max.map(|x| x + away) };
+            Near::of(input, &wide)?
+        }
+        None => Near::sparse(input)?,
+    };
+    let mut deviation = Deviation::of(info, &near.mesh, near.faces.clone(), most)?;
+    let base = fresh(mt)?;
+    let plain = PlainMesh::of(base.mesh());
+    let shape = Shape::of(&PlainReference { positions: plain.positions, levels: &[], tets: plain.tets })
+        .map_err(|failure| format!("the base mesh: {failure}"))?;
+    let mut front = base.clone();
+    let outcome = satisfy(mt, &mut front, &query)?;
+    if outcome.missing {
+        note(report, &query, "blocks that it needs are not here");
+    }
+    Case { mt, query: &query, front: &front, outcome: &outcome }.check(&base, &shape, &mut deviation, report);
+    report.queries += 1;
+    if let Some((inside, need)) = around.filter(|(_, need)| matches!(need.part, Part::Region(_))) {
+        let inside = Inside { info, near: &near, inside, mesh: PlainMesh::of(front.mesh()) };
+        let same = if need.error == 0.0 { inside.check_tets() } else { Ok(()) };
+        for failure in [same, inside.check_volume(need.error)].into_iter().filter_map(Result::err) {
+            note(report, &query, &failure);
+        }
+    }
+    satisfy(mt, &mut front, &Query::new("full coarsening", Request::within(f64::INFINITY)))?;
+    if front.mesh().hash() != base.mesh().hash() {
+        note(report, &query, "what is left after coarsening is not the base mesh");
+    }
+    Ok(())
+}
+
+/// The box that a need is limited to.
+fn region(need: &Need) -> Option<Bounds> {
+    match &need.part {
+        Part::Region(Region::Box(inside)) | Part::Both(Region::Box(inside), _) => Some(*inside),
+        _ => None,
+    }
+}
+
+/// The box around an input.
+fn bounds(input: &TetMesh) -> Bounds {
+    match input.grid.filter(|_| input.is_grid_alone()) {
+        Some(grid) => Bounds::of(&[grid.point([0; 3]), grid.point(grid.dims.map(|n| n - 1))]),
+        None => Bounds::of(&input.positions),
+    }
+}
+
+/// What an input has near a place.
+struct Near {
+    mesh: TetMesh,
+    /// Those of its faces that are of the domain's boundary.
+    faces: Vec<[u32; 3]>,
+}
+
+impl Near {
+    /// All tetrahedra whose bounding boxes meet a box.
+    fn of(input: &TetMesh, inside: &Bounds) -> Result<Self, String> {
+        match input.grid.filter(|_| input.is_grid_alone()) {
+            Some(grid) => Self::of_grid(input, &grid, inside),
+            None => Self::of_mesh(input, inside),
+        }
+    }
+
+    fn of_grid(input: &TetMesh, grid: &Grid, inside: &Bounds) -> Result<Self, String> {
+        // From this point to that one, with one to spare.
+        let [mut low, mut high] = [[0_u32; 3]; 2];
+        for k in 0..3 {
+            let last = grid.dims[k] - 1;
+            let at = |x: f64| ((x - grid.origin[k]) / grid.spacing[k]).clamp(0.0, f64::from(last)) as u32;
+            low[k] = at(inside.min[k]).saturating_sub(1).min(last - 1);
+            high[k] = (at(inside.max[k]) + 2).min(last).max(low[k] + 1);
+        }
+        let dims = [0, 1, 2].map(|k: usize| high[k] - low[k] + 1);
+        let indices: Vec<[u32; 3]> = (low[2]..=high[2])
+            .flat_map(|z| (low[1]..=high[1]).flat_map(move |y| (low[0]..=high[0]).map(move |x| [x, y, z])))
+            .collect();
+        let of_whole = |[x, y, z]: [u32; 3]| {
+            (u64::from(x) + u64::from(grid.dims[0]) * (u64::from(y) + u64::from(grid.dims[1]) * u64::from(z)))
+                as usize
+        };
+        let taken: Vec<usize> = indices.iter().map(|&index| of_whole(index)).collect();
+        let tets = kuhn_tets(dims);
+        let positions = indices.iter().map(|&index| grid.point(index)).collect();
+        let mesh = TetMesh { positions, tets, fields: values(input, &taken)?, ..TetMesh::default() };
+        let across = neighbors(&mesh.tets).map_err(|error| format!("the input: {error}"))?;
+        let is_side = |face: &[u32; 3]| {
+            (0..3).any(|k| {
+                let at = face.map(|v| indices[v as usize][k]);
+                at.iter().all(|&i| i == 0) || at.iter().all(|&i| i == grid.dims[k] - 1)
+            })
+        };
+        let faces = boundary_faces(&mesh.tets, &across).map(|(_, face)| face).filter(is_side).collect();
+        Ok(Self { mesh, faces })
+    }
+
+    fn of_mesh(input: &TetMesh, inside: &Bounds) -> Result<Self, String> {
+        let meets = |tet: &[u32; 4]| {
+            (0..3).all(|k| {
+                let x = tet.map(|v| input.positions[v as usize][k]);
+                let [low, high] = [
+                    x.iter().copied().fold(f64::INFINITY, f64::min),
+                    x.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+                ];
+                low <= inside.max[k] && high >= inside.min[k]
+            })
+        };
+        let mut local = vec![NONE; input.positions.len()];
+        let mut taken = Vec::new();
+        let mut tets = Vec::new();
+        for tet in input.tets.iter().filter(|tet| meets(tet)) {
+            tets.push(tet.map(|v| {
+                let number = &mut local[v as usize];
+                if *number == NONE {
+                    *number = taken.len() as u32;
+                    taken.push(v as usize);
+                }
+                *number
+            }));
+        }
+        let across = neighbors(&tets).map_err(|error| format!("the input: {error}"))?;
+        let sorted = |mut face: [u32; 3]| {
+            face.sort_unstable();
+            face
+        };
+        let mut faces: BTreeSet<[u32; 3]> =
+            boundary_faces(&tets, &across).map(|(_, face)| sorted(face)).collect();
+        // Some of these have a tetrahedron behind them that was not taken.
+        for tet in input.tets.iter().filter(|tet| !meets(tet)) {
+            let corners = tet.map(|v| local[v as usize]);
+            for face in FACES.map(|face| face.map(|k| corners[k])) {
+                if !face.contains(&NONE) {
+                    faces.remove(&sorted(face));
+                }
+            }
+        }
+        let positions = taken.iter().map(|&v| input.positions[v]).collect();
+        let mesh = TetMesh { positions, tets, fields: values(input, &taken)?, ..TetMesh::default() };
+        Ok(Self { mesh, faces: faces.into_iter().collect() })
+    }
+
+    /// Some points from all over the domain, and its boundary, without tetrahedra.
+    fn sparse(input: &TetMesh) -> Result<Self, String> {
+        let [points, _] = input.counts();
+        let stride = (points as usize).div_ceil(VERTICES).max(1);
+        let mut taken: Vec<usize> = (0..points as usize).step_by(stride).collect();
+        let Some(grid) = input.grid.filter(|_| input.is_grid_alone()) else {
+            let across = neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
+            let mut faces: Vec<[u32; 3]> =
+                boundary_faces(&input.tets, &across).map(|(_, face)| face).collect();
+            taken.extend(faces.iter().flatten().map(|&v| v as usize));
+            taken.sort_unstable();
+            taken.dedup();
+            let number = |v: u32| taken.partition_point(|&other| other < v as usize) as u32;
+            faces.iter_mut().for_each(|face| *face = face.map(number));
+            let positions = taken.iter().map(|&v| input.positions[v]).collect();
+            let mesh = TetMesh { positions, fields: values(input, &taken)?, ..TetMesh::default() };
+            return Ok(Self { mesh, faces });
+        };
+        // The boundary of a grid is that of its box.
+        let [nx, ny, nz] = grid.dims.map(|n| n as usize);
+        let of_corner = |c: usize| [(c & 1) * (nx - 1), (c >> 1 & 1) * (ny - 1), (c >> 2) * (nz - 1)];
+        let first = taken.len() as u32;
+        let index = |i: usize| [i % nx, i / nx % ny, i / (nx * ny)];
+        let mut indices: Vec<[usize; 3]> = taken.iter().map(|&i| index(i)).collect();
+        indices.extend((0..8).map(of_corner));
+        taken.extend((0..8).map(of_corner).map(|[x, y, z]| x + nx * (y + ny * z)));
+        let cube = kuhn_tets([2; 3]);
+        let across = neighbors(&cube).map_err(|error| format!("the input: {error}"))?;
+        let faces = boundary_faces(&cube, &across).map(|(_, face)| face.map(|v| first + v)).collect();
+        let positions = indices.iter().map(|index| grid.point(index.map(|i| i as u32))).collect();
+        let mesh = TetMesh { positions, fields: values(input, &taken)?, ..TetMesh::default() };
+        Ok(Self { mesh, faces })
+    }
+}
+
+/// The fields at these points.
+fn values(input: &TetMesh, points: &[usize]) -> Result<Vec<Field>, String> {
+    let of = |field: &Field| {
+        let values: Option<Vec<f64>> = points.iter().map(|&v| field.values.get(v).copied()).collect();
+        let values = values.ok_or_else(|| format!("the input: field '{}' lacks values", field.name))?;
+        let Field { name, unit, vector, time, integer, .. } = field;
+        Ok(Field {
+            name: name.clone(),
+            values,
+            unit: unit.clone(),
+            vector: vector.clone(),
+            time: *time,
+            integer: *integer,
+        })
+    };
+    input.fields.iter().map(of).collect()
+}
+
+/// A box, what the input has there, and a mesh.
+struct Inside<'a> {
+    info: &'a MtInfo,
+    near: &'a Near,
+    inside: Bounds,
+    mesh: PlainMesh<'a>,
+}
+
+/// Volumes are compared up to this part.
+const VOLUME_SLACK: f64 = 1e-9;
+
+impl Inside<'_> {
+    /// Whether the tetrahedra in the box are those of the input. Those that only touch its rim may be either.
+    fn check_tets(&self) -> Result<(), String> {
+        let Self { info, near, inside, mesh } = self;
+        let [low, high] = [inside.min, inside.max].map(|p| self.on_lattice(p));
+        let region = LatticeBox {
+            min: [0, 1, 2].map(|k| (low[k].floor() as i32).saturating_add(1)),
+            max: [0, 1, 2].map(|k| (high[k].ceil() as i32).saturating_sub(1)),
+        };
+        let fields: Vec<&Field> = info
+            .fields
+            .iter()
+            .filter_map(|field| near.mesh.fields.iter().find(|known| field.is_of(known)))
+            .collect();
+        let hash = |p: [i32; 3], levels: &mut dyn Iterator<Item = i32>| {
+            p.into_iter().chain(levels).fold(0, |h, word| mix(h ^ u64::from(word as u32)))
+        };
+        let positions: Vec<[i32; 3]> = near.mesh.positions.iter().map(|&p| info.lattice.nearest(p)).collect();
+        let wanted = keys(&positions, &near.mesh.tets, &region, |v| {
+            let levels =
+                fields.iter().zip(&info.fields).map(|(known, field)| field.nearest(known.values[v as usize]));
+            hash(positions[v as usize], &mut levels.into_iter())
+        });
+        let found = keys(mesh.positions, mesh.tets, &region, |v| {
+            hash(mesh.positions[v as usize], &mut mesh.mesh.levels(v).iter().copied())
+        });
+        if found == wanted {
+            return Ok(());
+        }
+        let common = found.iter().filter(|key| wanted.binary_search(key).is_ok()).count();
+        Err(format!(
+            "of {} tetrahedra in the box {common} are of the input, which has {} there",
+            found.len(),
+            wanted.len()
+        ))
+    }
+
+    /// Whether the volumes of the tetrahedra, as far as they are in the box, add up to what is inside of the domain there.
+    fn check_volume(&self, error: f64) -> Result<(), String> {
+        let Self { near, mesh, .. } = self;
+        let places = |positions: &[[i32; 3]]| -> Vec<DVec3> {
+            positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect()
+        };
+        let reference: Vec<[i32; 3]> =
+            near.mesh.positions.iter().map(|&p| self.info.lattice.nearest(p)).collect();
+        let (ours, theirs) = (places(mesh.positions), places(&reference));
+        let [low, high] = [self.inside.min, self.inside.max].map(|p| DVec3::from(self.on_lattice(p)));
+        let touches = |corners: &[DVec3]| {
+            let least = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+            let most = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+            least.cmple(high).all() && most.cmpge(low).all()
+        };
+        let has_boundary = mesh.boundary().any(|(_, face)| touches(&face.map(|v| ours[v as usize])))
+            || near.faces.iter().any(|face| touches(&face.map(|v| theirs[v as usize])));
+        let sum = |places: &[DVec3], tets: &[[u32; 4]]| -> f64 {
+            let corners = tets.iter().map(|tet| tet.map(|v| places[v as usize]));
+            corners.filter(|corners| touches(corners)).map(|corners| clipped(corners, low, high, 0)).sum()
+        };
+        let wanted = match has_boundary {
+            false => (high - low).element_product(),
+            true if error == 0.0 => sum(&theirs, &near.mesh.tets),
+            true => return Ok(()),
+        };
+        let found = sum(&ours, mesh.tets);
+        if (found - wanted).abs() <= VOLUME_SLACK * wanted.max(1.0) {
+            return Ok(());
+        }
+        Err(format!("the volumes in the box add up to {} of what is there", found / wanted))
+    }
+
+    fn on_lattice(&self, p: [f64; 3]) -> [f64; 3] {
+        let lattice = &self.info.lattice;
+        [0, 1, 2].map(|k| (p[k] - lattice.origin[k]) / lattice.step[k])
+    }
+}
+
+/// The tetrahedra that meet a box, by what is known of their corners; sorted.
+fn keys(
+    positions: &[[i32; 3]],
+    tets: &[[u32; 4]],
+    region: &LatticeBox,
+    corner: impl Fn(u32) -> u64,
+) -> Vec<[u64; 4]> {
+    let meets = |tet: &&[u32; 4]| tet_meets_box(&tet.map(|v| positions[v as usize]), region);
+    let key = |tet: &[u32; 4]| {
+        let mut key = tet.map(&corner);
+        key.sort_unstable();
+        key
+    };
+    let mut all: Vec<[u64; 4]> = tets.iter().filter(meets).map(key).collect();
+    all.sort_unstable();
+    all
+}
+
+/// The volume of a tetrahedron inside of a box: clipped at one side after the other, from side `side` on.
+fn clipped(corners: [DVec3; 4], low: DVec3, high: DVec3, side: usize) -> f64 {
+    if side == 6 {
+        let [a, b, c, d] = corners;
+        return ((b - a).cross(c - a).dot(d - a) / 6.0).abs();
+    }
+    let (axis, is_high) = (side / 2, side % 2 == 1);
+    // How far inside a corner is.
+    let depth = |p: DVec3| if is_high { high[axis] - p[axis] } else { p[axis] - low[axis] };
+    let mut sorted = corners;
+    sorted.sort_by(|&p, &q| depth(q).total_cmp(&depth(p)));
+    let [a, b, c, d] = sorted;
+    let cut = |p: DVec3, q: DVec3| p.lerp(q, depth(p) / (depth(p) - depth(q)));
+    let next = |corners: [DVec3; 4]| clipped(corners, low, high, side + 1);
+    match sorted.iter().filter(|&&p| depth(p) > 0.0).count() {
+        0 => 0.0,
+        1 => next([a, cut(a, b), cut(a, c), cut(a, d)]),
+        2 => {
+            let [ac, ad, bc, bd] = [cut(a, c), cut(a, d), cut(b, c), cut(b, d)];
+            // A wedge between the triangles of its two ends.
+            next([a, ac, ad, b]) + next([ac, ad, b, bc]) + next([ad, b, bc, bd])
+        }
+        3 => {
+            let [ad, bd, cd] = [cut(a, d), cut(b, d), cut(c, d)];
+            next([a, b, c, ad]) + next([b, c, ad, bd]) + next([c, ad, bd, cd])
+        }
+        _ => next(corners),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clipped_volumes_add_up() {
+        let mut numbers = Numbers(7);
+        let mut point = || DVec3::new(numbers.part(), numbers.part(), numbers.part());
+        for _ in 0..200 {
+            let corners = [point(), point(), point(), point()];
+            let whole = clipped(corners, DVec3::splat(-1.0), DVec3::splat(2.0), 0);
+            let cut = point();
+            // The eight boxes around a point.
+            let parts: f64 = (0..8)
+                .map(|i| {
+                    let is_low = |k: usize| i >> k & 1 == 0;
+                    let end = |k: usize, low: f64, high: f64| if is_low(k) { low } else { high };
+                    let low = DVec3::new(end(0, -1.0, cut.x), end(1, -1.0, cut.y), end(2, -1.0, cut.z));
+                    let high = DVec3::new(end(0, cut.x, 2.0), end(1, cut.y, 2.0), end(2, cut.z, 2.0));
+                    clipped(corners, low, high, 0)
+                })
+                .sum();
+            assert!((parts - whole).abs() < 1e-12, "{parts} {whole}");
+        }
+    }
+}

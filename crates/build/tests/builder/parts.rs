@@ -1,0 +1,318 @@
+//! Promise: what is built in parts is one MT like any other, over the same reference mesh, with errors that hold; one part is the
+//! whole; and no damaged part makes a step panic.
+
+use crate::support::meshes::{bent, blocks, hilly, linear};
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::ops::ControlFlow;
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::mesh::{Field, Grid, TetMesh};
+use tetralod::mt::{Mt, MtKind, MultiTessellation, UpdatePages};
+use tetralod_build::parts::{self, Node, Part, PartUpdates, PartsError, Plan};
+use tetralod_build::verify::{self, Reference};
+use tetralod_build::{BuildConfig, BuildError, BuildProgress, BuildResult, OnProgress, build};
+
+fn go_on(_: BuildProgress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// What each step writes, by node.
+#[derive(Default)]
+struct Files {
+    parted: Vec<Vec<u8>>,
+    built: BTreeMap<Node, Vec<u8>>,
+}
+
+impl Files {
+    fn parted(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> (Plan, Self) {
+        let mut files = Self::default();
+        let plan = parts::part(mesh, config, parts, BTreeMap::new(), &mut |part| {
+            let mut bytes = Vec::new();
+            part.write(&mut bytes)?;
+            files.parted.push(bytes);
+            Ok(())
+        });
+        (plan.expect("a mesh that can be parted"), files)
+    }
+
+    fn build(&mut self, index: u32) {
+        let part = read(&self.parted[index as usize]).expect("a part");
+        let (part, updates) = parts::build_part(part, &mut go_on).expect("a part to build");
+        self.keep(&part, &updates);
+    }
+
+    fn keep(&mut self, part: &Part, updates: &PartUpdates) {
+        let mut bytes = Vec::new();
+        part.write_built(updates, &mut bytes).expect("bytes");
+        assert_eq!(&PartUpdates::read(&mut Cursor::new(&bytes)).expect("updates"), updates);
+        assert_eq!(&read(&bytes).expect("a part"), part);
+        self.built.insert(part.node(), bytes);
+    }
+
+    fn join(&mut self, plan: &Plan, node: Node) {
+        let children = plan.children(node).expect("children");
+        let left = children.iter().map(|child| read(&self.built[child]).expect("a part")).collect();
+        let (part, updates) = parts::join(node, left, &mut go_on).expect("parts to join");
+        self.keep(&part, &updates);
+    }
+
+    fn updates(&self, node: Node) -> Result<PartUpdates, PartsError> {
+        PartUpdates::read(&mut Cursor::new(&self.built[&node]))
+    }
+
+    fn assemble(&self, plan: &Plan) -> BuildResult {
+        let whole = read(&self.built[&plan.nodes()[0]]).expect("the last part");
+        parts::assemble(whole, &|node| self.updates(node), &mut go_on).expect("an MT")
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<Part, PartsError> {
+    Part::read(&mut Cursor::new(bytes))
+}
+
+pub fn in_parts(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> BuildResult {
+    let (plan, mut files) = Files::parted(mesh, config, parts);
+    // In any order.
+    (0..parts).rev().for_each(|index| files.build(index));
+    let joins: Vec<Node> = plan.nodes().into_iter().rev().filter(|node| node.level > 0).collect();
+    let mut by_level = joins;
+    by_level.sort();
+    by_level.into_iter().for_each(|node| files.join(&plan, node));
+    files.assemble(&plan)
+}
+
+pub fn bytes(built: &BuildResult) -> Vec<u8> {
+    let options = EncodeOptions {
+        check_margins: true,
+        exact: built.exact.clone(),
+        histograms: true,
+        ..EncodeOptions::default()
+    };
+    let bytes = encode(&built.mt, &options).expect("an MT that can be written");
+    // In pages anew nothing is known of the blocks.
+    let scanned = built.mt.in_pages(built.mt.page_bits()).expect("a complete MT");
+    assert!(encode(&scanned, &options).expect("an MT that can be written") == bytes, "other blocks");
+    bytes
+}
+
+/// A convex grid, one that is not convex, with two fields, and curved boundaries on a lattice that moves points.
+fn meshes() -> [(&'static str, TetMesh); 3] {
+    let notched = blocks([10, 8, 7], &[hilly, linear], |[x, y, z]| x < 6 || y < 3 || z > 4);
+    [("cube", blocks([9; 3], &[hilly], |_| true)), ("notched", notched), ("bent", bent(8))]
+}
+
+#[test]
+fn one_part_is_the_whole() {
+    for (name, mesh) in meshes() {
+        let config = BuildConfig { all_lossless: true, ..BuildConfig::default() };
+        let whole = build(&mesh, &config, &mut go_on).expect("a valid mesh");
+        let one = in_parts(&mesh, &config, 1);
+        assert_eq!(one.summary, whole.summary, "{name}");
+        assert!(bytes(&one) == bytes(&whole), "{name}: other bytes");
+    }
+}
+
+#[test]
+fn parts_make_one_mt_that_keeps_every_promise() {
+    for (name, mesh) in meshes() {
+        let config = BuildConfig { all_fields: true, ..BuildConfig::default() };
+        let whole = build(&mesh, &config, &mut go_on).expect("a valid mesh").summary;
+        for parts in [2, 8, 16] {
+            let built = in_parts(&mesh, &config, parts);
+            let summary = built.summary;
+            assert_eq!(
+                [summary.vertices, summary.tetrahedra, summary.updates + summary.base_vertices],
+                [whole.vertices, whole.tetrahedra, whole.vertices],
+                "{name}, {parts}"
+            );
+            // What was between parts is simplified, too.
+            assert!(summary.base_vertices <= 2 * whole.base_vertices + 8, "{name}, {parts}: {summary:?}");
+            let report = verify::run(&built.mt, &mesh, Reference::Mesh, &mut |_, _| {});
+            assert!(report.valid && report.queries > 40, "{name}, {parts}: {:#?}", report.failures);
+            let again = in_parts(&mesh, &config, parts);
+            assert!(bytes(&again) == bytes(&built), "{name}, {parts}: other bytes the next time");
+        }
+    }
+}
+
+/// What [`parts::part`] passes on.
+pub fn parted(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> (Plan, Vec<Part>) {
+    let mut all = Vec::new();
+    let plan = parts::part(mesh, config, parts, BTreeMap::new(), &mut |part| {
+        all.push(part);
+        Ok(())
+    });
+    (plan.expect("a mesh that can be parted"), all)
+}
+
+#[test]
+fn a_grid_alone_has_the_parts_of_its_mesh() {
+    let grids = [
+        ([9, 9, 9], [0.0; 3], [0.125; 3]),
+        ([17, 6, 12], [-3.0, 0.7, 1e3], [1.0, 2.5, 0.3]),
+        ([2, 40, 3], [0.1; 3], [0.1, 0.2, 0.3]),
+        ([5, 5, 5], [1e9; 3], [1e-3; 3]),
+    ];
+    for (dims, origin, spacing) in grids {
+        let grid = Grid { dims, origin, spacing };
+        let whole = TetMesh::from_grid(grid, Vec::new());
+        let fields: Vec<Field> = [hilly as fn([f64; 3]) -> f64, linear]
+            .iter()
+            .zip(["a", "b"])
+            .map(|(of, name)| Field::new(name, whole.positions.iter().map(|p| of(*p)).collect()))
+            .collect();
+        let whole = TetMesh { fields: fields.clone(), ..whole };
+        let alone = TetMesh::of_grid_alone(grid, fields);
+        assert_eq!(alone.counts(), [whole.positions.len() as u64, whole.tets.len() as u64]);
+        let keep_points = vec![grid.point([1, 2, 0]), grid.point(dims.map(|n| n - 1))];
+        for (position_bits, keep_points) in [(None, keep_points), (Some(12), Vec::new())] {
+            for count in [1, 2, 8, 16] {
+                let keep_points = keep_points.clone();
+                let config =
+                    BuildConfig { all_fields: true, position_bits, keep_points, ..BuildConfig::default() };
+                let [expected, found] = [&whole, &alone].map(|mesh| parted(mesh, &config, count));
+                assert_eq!(found.0, expected.0, "{dims:?}, {count}");
+                for (found, expected) in found.1.iter().zip(&expected.1) {
+                    assert!(found == expected, "{dims:?}, {count} parts: {:?} differs", found.node());
+                }
+                assert_eq!(found.1.len(), count as usize);
+            }
+        }
+    }
+    // What only a mesh can tell is refused as of a mesh.
+    let grid = Grid { dims: [3; 3], origin: [0.0; 3], spacing: [1.0; 3] };
+    let refused = |values: Vec<f64>, parts: u32| {
+        let alone = TetMesh::of_grid_alone(grid, vec![Field::new("a", values)]);
+        parts::part(&alone, &BuildConfig::default(), parts, BTreeMap::new(), &mut |_| Ok(()))
+            .expect_err("refused")
+    };
+    assert!(matches!(refused(vec![0.0; 26], 2), PartsError::Build(BuildError::Mesh(_))));
+    let mut values = vec![0.0; 27];
+    assert!(matches!(refused(values.clone(), 64), PartsError::TooMany { parts: 64, tetrahedra: 48 }));
+    let alone = TetMesh::of_grid_alone(grid, vec![Field::new("a", values.clone())]);
+    let keep = |place: [f64; 3]| BuildConfig { keep_points: vec![place], ..BuildConfig::default() };
+    let between = parts::part(&alone, &keep([0.5; 3]), 2, BTreeMap::new(), &mut |_| Ok(()));
+    assert!(matches!(between, Err(PartsError::Build(BuildError::NoPoint { .. }))));
+    values[7] = f64::NAN;
+    assert!(matches!(refused(values, 2), PartsError::Build(BuildError::NotFinite { point: 7 })));
+}
+
+#[test]
+fn the_progress_of_a_step_is_that_of_the_step() {
+    let mesh = blocks([24; 3], &[hilly], |_| true);
+    let (plan, mut files) = Files::parted(&mesh, &BuildConfig::default(), 8);
+    (0..8).for_each(|index| files.build(index));
+    let whole = plan.nodes()[0];
+    let shares = |work: &dyn Fn(OnProgress<'_>)| {
+        let mut shares = Vec::new();
+        work(&mut |now: BuildProgress| {
+            if now.stage == "remove" {
+                shares.push(now.done as f64 / now.total as f64);
+            }
+            go_on(now)
+        });
+        assert!(shares.is_sorted() && shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
+        (shares[0], shares.pop().expect("progress"))
+    };
+    let children = plan.children(whole).expect("children");
+    let left = || children.iter().map(|child| read(&files.built[child]).expect("a part")).collect();
+    // Neither the vertices that were removed before count, nor those that stay.
+    let (first, last) = shares(&|progress| drop(parts::join(whole, left(), progress).expect("a join")));
+    assert!(first < 0.1 && last > 0.5, "{first} to {last}");
+    let part = || read(&files.parted[0]).expect("a part");
+    let (first, last) = shares(&|progress| drop(parts::build_part(part(), progress).expect("a part")));
+    assert!(first < 0.1 && last > 0.5, "{first} to {last}");
+}
+
+#[test]
+fn levels_and_children_are_those_of_an_octree() {
+    let mesh = blocks([6; 3], &[hilly], |_| true);
+    let (plan, files) = Files::parted(&mesh, &BuildConfig::default(), 32);
+    assert_eq!((plan.parts(), plan.levels()), (32, vec![32, 4, 1]));
+    assert_eq!(plan.nodes().len(), 37);
+    let children = plan.children(Node { level: 2, index: 0 }).expect("four");
+    assert_eq!(children.len(), 4);
+    assert!(
+        plan.children(Node { level: 2, index: 1 }).is_err()
+            && plan.children(Node { level: 0, index: 0 }).is_err()
+    );
+    let sizes: Vec<usize> =
+        files.parted.iter().map(|bytes| read(bytes).expect("a part").tetrahedra()).collect();
+    assert_eq!(sizes.iter().sum::<usize>(), mesh.tets.len());
+    assert!(sizes.iter().all(|&n| n > 0));
+}
+
+#[test]
+fn what_cannot_be_parted_or_joined_is_refused() {
+    let mesh = blocks([4; 3], &[hilly], |_| true);
+    let config = BuildConfig::default();
+    let part = |mesh: &TetMesh, config: &BuildConfig, parts: u32| {
+        parts::part(mesh, config, parts, BTreeMap::new(), &mut |_| Ok(())).expect_err("a refusal")
+    };
+    assert!(matches!(part(&mesh, &config, 3), PartsError::Count { parts: 3 }));
+    assert!(matches!(part(&mesh, &config, 0), PartsError::Count { parts: 0 }));
+    assert!(matches!(part(&mesh, &config, 4096), PartsError::TooMany { parts: 4096, .. }));
+    assert!(matches!(part(&mesh, &BuildConfig::of(MtKind::Edge), 2), PartsError::Kind));
+    let mut unused = mesh.clone();
+    unused.positions.push([9.0; 3]);
+    unused.fields[0].values.push(0.0);
+    unused.grid = None;
+    assert!(matches!(part(&unused, &config, 2), PartsError::UnusedPoint { point: 125 }));
+    let unknown = BuildConfig { fields: vec!["g".to_owned()], ..config.clone() };
+    assert!(matches!(part(&mesh, &unknown, 2), PartsError::Build(BuildError::UnknownField { .. })));
+
+    let within = BuildConfig { preserve: vec!["f".to_owned()], preserve_within: 0.1, ..config.clone() };
+    assert!(matches!(part(&mesh, &within, 2), PartsError::Build(BuildError::Combination { .. })));
+
+    let (plan, mut files) = Files::parted(&mesh, &config, 8);
+    (0..8).for_each(|index| files.build(index));
+    let left = || -> Vec<Part> {
+        plan.children(Node { level: 1, index: 0 })
+            .expect("eight")
+            .iter()
+            .map(|child| read(&files.built[child]).expect("a part"))
+            .collect()
+    };
+    let top = Node { level: 1, index: 0 };
+    let mut turned = left();
+    turned.swap(0, 1);
+    assert!(matches!(parts::join(top, turned, &mut go_on), Err(PartsError::Children { .. })));
+    let mut few = left();
+    few.pop();
+    assert!(matches!(parts::join(top, few, &mut go_on), Err(PartsError::Children { .. })));
+    let unbuilt = files.parted.iter().map(|bytes| read(bytes).expect("a part")).collect();
+    assert!(matches!(parts::join(top, unbuilt, &mut go_on), Err(PartsError::Children { .. })));
+    let (_, mut other) = Files::parted(&blocks([4; 3], &[linear], |_| true), &config, 8);
+    other.build(0);
+    let mut mixed = left();
+    mixed[0] = read(&other.built[&Node { level: 0, index: 0 }]).expect("a part");
+    assert!(matches!(parts::join(top, mixed, &mut go_on), Err(PartsError::OtherPlan)));
+    let stopped = parts::build_part(read(&files.parted[0]).expect("a part"), &mut |_| ControlFlow::Break(()));
+    assert!(matches!(stopped, Err(PartsError::Build(BuildError::Stopped))));
+    let twice = parts::build_part(left().remove(0), &mut go_on);
+    assert!(twice.is_err());
+}
+
+#[test]
+fn damaged_parts_are_refused() {
+    let mesh = blocks([4; 3], &[hilly], |_| true);
+    let (plan, mut files) = Files::parted(&mesh, &BuildConfig::default(), 2);
+    (0..2).for_each(|index| files.build(index));
+    let top = Node { level: 1, index: 0 };
+    files.join(&plan, top);
+    for bytes in [&files.parted[0], &files.built[&top]] {
+        for at in (0..bytes.len()).step_by(bytes.len() / 97 + 1) {
+            assert!(read(&bytes[..at]).is_err(), "cut at {at}");
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 0x10;
+            let same = read(&flipped).is_ok() && PartUpdates::read(&mut Cursor::new(&flipped)).is_ok();
+            assert!(!same, "flipped at {at}");
+        }
+    }
+    // Updates that are missing are told, not made up.
+    let whole = read(&files.built[&top]).expect("the last part");
+    let missing = |_| files.updates(top);
+    assert!(parts::assemble(whole, &missing, &mut go_on).is_err());
+    let mt: Mt = files.assemble(&plan).mt;
+    assert_eq!(mt.info().vertices, 125);
+}

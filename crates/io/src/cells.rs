@@ -1,0 +1,423 @@
+//! Cells as files list them, to tetrahedra.
+//!
+//! Cells with a volume are split by the recipes of `cell_shapes`; those without one (vertices, lines, polygons), which
+//! meshers write beside them for boundaries, are left out. What cannot be split is refused, counted by type.
+
+use std::collections::BTreeMap;
+
+use crate::MemoryLimit;
+use crate::cell_shapes::{PYRAMID_14, Recipe, middles, recipe};
+use crate::error::{ReadReason, cell_name, names};
+use crate::vtu::{GHOST_CELL, HIDDEN_CELL};
+use tetralod::mesh::{BitSet, CellNumbers, Field, MeshInput};
+
+/// VTK's number for no cell at all; also that of cells which are to be left out.
+pub(super) const EMPTY: i64 = 0;
+/// And for a tetrahedron.
+pub(super) const TETRAHEDRON: i64 = 10;
+/// And for cells that say no more than that there are points.
+const VERTICES: [i64; 2] = [1, 2];
+/// And for cells without a volume: linear, quadratic, and of any order.
+const FLAT: [i64; 31] = [
+    EMPTY, HIDDEN, GHOST, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 51, 52, 53, 54, 60, 61,
+    62, 63, 68, 69, 70,
+];
+/// And for those of Bezier.
+const FLAT_BEZIER: [i64; 3] = [75, 76, 77];
+/// Numbers of our own for cells that are marked as hidden, and as those of another piece.
+pub(super) const HIDDEN: i64 = -1;
+pub(super) const GHOST: i64 = -2;
+/// VTK's number for a hexahedron of any order.
+pub(super) const LAGRANGE_HEXAHEDRON: i64 = 72;
+/// Types of any order, and a number of our own for each with its points: this times the type, and the points.
+const ANY_ORDERS: [i64; 8] = [71, 72, 73, 74, 78, 79, 80, 81];
+pub(super) const ANY_ORDER: i64 = 10_000;
+
+/// Cells of any order that are those of another type: type, points, and that one.
+const SAME_AS: [(i64, i64, i64); 12] = [
+    (71, 4, 10),
+    (71, 10, 24),
+    (72, 8, 12),
+    (72, 27, 29),
+    (73, 6, 13),
+    (73, 18, 32),
+    (74, 5, 14),
+    (74, 14, PYRAMID_14),
+    (78, 4, 10),
+    (79, 8, 12),
+    (80, 6, 13),
+    (81, 5, 14),
+];
+
+/// Whether the number of points of cells of these types says what they are.
+pub(super) fn depend_on_points(types: &[i64]) -> bool {
+    types.iter().any(|kind| ANY_ORDERS.contains(kind))
+}
+
+/// Gives cells of any order the types that they have with their number of points; those of a higher order get a number of our own.
+pub(super) fn resolve_orders(types: &mut [i64], ends: &[i64]) {
+    let mut start = 0;
+    for (kind, &end) in types.iter_mut().zip(ends) {
+        let points = end.saturating_sub(start);
+        start = end;
+        if ANY_ORDERS.contains(kind) {
+            let same = SAME_AS.iter().find(|(of, count, _)| (*of, *count) == (*kind, points));
+            *kind = same.map_or(*kind * ANY_ORDER + points.clamp(0, ANY_ORDER - 1), |(.., same)| *same);
+        }
+    }
+}
+
+/// Whether the cells are vertices and poly-vertices alone, as of data sets that are only points.
+pub(super) fn are_points(types: &[i64]) -> bool {
+    types.iter().all(|t| VERTICES.contains(t))
+}
+
+/// How many points a cell without a volume has, where that follows from its type.
+fn points_of_flat(kind: i64) -> Option<i64> {
+    let known = [(1, 1), (3, 2), (5, 3), (8, 4), (9, 4), (21, 3), (22, 6), (23, 8), (28, 9)];
+    known.iter().find(|(flat, _)| *flat == kind).map(|(_, points)| *points)
+}
+
+/// Whether a file may list cells of this type, which are then left out.
+pub(super) fn is_flat(kind: i64) -> bool {
+    FLAT.contains(&kind) || FLAT_BEZIER.contains(&kind)
+}
+
+/// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a
+/// volume, with the number of each type.
+pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
+    let counts = counts_of(types);
+    let mut tets = 0_u64;
+    for (&kind, &count) in &counts {
+        match recipe(kind) {
+            Some(recipe) => tets = tets.saturating_add(count.saturating_mul(recipe.most_tets() as u64)),
+            // How many a cell of any order has is known with its points: the most of the second order.
+            None if ANY_ORDERS.contains(&kind) => tets = tets.saturating_add(count.saturating_mul(48)),
+            None if is_flat(kind) => {}
+            None => return Err(ReadReason::CellTypes(counts.into_iter().collect())),
+        }
+    }
+    if tets == 0 && !types.is_empty() {
+        return Err(ReadReason::CellTypes(counts.into_iter().collect()));
+    }
+    Ok(tets)
+}
+
+fn counts_of(types: &[i64]) -> BTreeMap<i64, u64> {
+    let mut counts = BTreeMap::new();
+    for kind in types {
+        *counts.entry(*kind).or_insert(0_u64) += 1;
+    }
+    counts
+}
+
+/// The number of our own for a cell that VTK's flags leave out.
+pub(super) fn left_out_by(flags: i64) -> Option<i64> {
+    if flags & HIDDEN_CELL != 0 { Some(HIDDEN) } else { (flags & GHOST_CELL != 0).then_some(GHOST) }
+}
+
+/// Notes which cells are left out.
+pub(super) fn leave_out(types: &[i64], input: &mut MeshInput) {
+    for (kind, count) in counts_of(types).into_iter().filter(|(kind, _)| is_flat(*kind)) {
+        let (one, many) = names(kind).unwrap_or(("cell without a volume", "cells without a volume"));
+        input.leave_out(count, one, many);
+    }
+}
+
+/// The points of a cell in the middle of corners, with these.
+type Middles = Vec<(u8, &'static [u8])>;
+
+/// Recipes that were looked up, and middles.
+#[derive(Default)]
+struct Recipes(BTreeMap<i64, Option<(Recipe, Middles)>>);
+
+impl Recipes {
+    fn of(&mut self, kind: i64) -> Option<&Recipe> {
+        self.with_middles(kind).map(|(recipe, _)| recipe)
+    }
+
+    fn with_middles(&mut self, kind: i64) -> Option<&(Recipe, Middles)> {
+        self.0.entry(kind).or_insert_with(|| recipe(kind).map(|recipe| (recipe, middles(kind)))).as_ref()
+    }
+}
+
+/// What the points of a part of a file are called in the mesh.
+pub(super) enum Numbering {
+    /// As many points, of which the first has this number.
+    From { first: u32, points: usize },
+    /// Each has its own.
+    #[cfg(not(target_arch = "wasm32"))]
+    Each(Vec<u32>),
+}
+
+impl Numbering {
+    fn points(&self) -> usize {
+        match self {
+            Self::From { points, .. } => *points,
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Each(numbers) => numbers.len(),
+        }
+    }
+
+    fn of(&self, cell: usize, point: i64) -> Result<u32, ReadReason> {
+        let index = usize::try_from(point).ok().filter(|p| *p < self.points());
+        let number = index.and_then(|p| match self {
+            Self::From { first, .. } => u32::try_from(p).ok().and_then(|p| p.checked_add(*first)),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Each(numbers) => numbers.get(p).copied(),
+        });
+        let points = self.points() as u64;
+        number.ok_or(ReadReason::MissingPoint { cell: cell as u64, point, points })
+    }
+}
+
+/// Checks where cells of these types end in the connectivity list; returns its length.
+pub(super) fn checked_ends(types: &[i64], ends: &[i64]) -> Result<usize, ReadReason> {
+    let (mut start, mut recipes) = (0, Recipes::default());
+    for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
+        let needed = recipes.of(kind).map(|recipe| recipe.points as i64).or_else(|| points_of_flat(kind));
+        let found = end.checked_sub(start).filter(|n| *n >= 0);
+        let found = found
+            .ok_or_else(|| ReadReason::Syntax(format!("cell {cell} ends at {end}, before it begins")))?;
+        if let Some(needed) = needed.filter(|needed| *needed != found) {
+            let name = cell_name(kind);
+            return Err(ReadReason::Syntax(format!(
+                "cell {cell}, a {name}, has {found} points, not {needed}"
+            )));
+        }
+        start = end;
+    }
+    usize::try_from(start).map_err(|_| ReadReason::TooLarge { what: "cells".into(), limit: u64::MAX })
+}
+
+/// The tetrahedra of some cells.
+#[derive(Debug, Default)]
+pub(super) struct Split {
+    pub tets: Vec<[u32; 4]>,
+    /// The cell of each tetrahedron; none while they are the same.
+    cells: Option<Vec<u32>>,
+    /// What is known of the cells.
+    pub input: MeshInput,
+}
+
+impl Split {
+    /// Turns fields at cells into fields at tetrahedra.
+    pub fn spread(&self, fields: &mut [Field]) {
+        let Some(cells) = &self.cells else { return };
+        for field in fields.iter_mut().filter(|field| !field.values.is_empty()) {
+            field.values = cells.iter().map(|&cell| field.values[cell as usize]).collect();
+        }
+    }
+
+    /// Notes that the tetrahedra from number `first` on are those of `cell`.
+    fn came_from(&mut self, cell: usize, first: usize) {
+        if self.cells.is_none() && first == cell && self.tets.len() == cell + 1 {
+            return;
+        }
+        // As long as cells were tetrahedra, both have the same numbers.
+        let cells = self.cells.get_or_insert_with(|| (0..first as u32).collect());
+        cells.resize(self.tets.len(), cell as u32);
+    }
+
+    /// Keeps for messages which cells the tetrahedra are of.
+    fn describe(&mut self, types: &[i64]) {
+        leave_out(types, &mut self.input);
+        self.input.cells = match &self.cells {
+            None => CellNumbers::same(self.tets.len()),
+            Some(cells) => CellNumbers::each(cells.clone(), types.len(), runs(types)),
+        };
+    }
+}
+
+/// The first cell of each run of cells of one type, with its name.
+fn runs(types: &[i64]) -> Vec<(u32, &'static str)> {
+    let mut runs = Vec::new();
+    let mut last = None;
+    for (cell, &kind) in (0..).zip(types).filter(|(_, kind)| !is_flat(**kind)) {
+        if last.replace(kind) != Some(kind) {
+            runs.push((cell, names(kind).map_or("cell", |(one, _)| one)));
+        }
+    }
+    runs
+}
+
+/// Cells as a file lists them, whose ends were checked.
+#[derive(Debug, Default)]
+pub(super) struct CellList {
+    pub types: Vec<i64>,
+    /// Where the points of each cell end in the list of all.
+    pub ends: Vec<i64>,
+    pub connectivity: Vec<i64>,
+}
+
+impl CellList {
+    /// Splits the cells, and drops them.
+    pub fn split(self, numbering: &Numbering, memory: &MemoryLimit) -> Result<Split, ReadReason> {
+        split(&self, numbering, memory)
+    }
+
+    /// Which of so many points cells with a volume use.
+    pub fn used(&self, points: usize) -> Vec<bool> {
+        let mut used = vec![false; points];
+        for (_, listed) in self.solid() {
+            let listed = listed.iter().filter_map(|&point| usize::try_from(point).ok());
+            listed.for_each(|point| used.get_mut(point).into_iter().for_each(|used| *used = true));
+        }
+        used
+    }
+
+    /// The cells that have a volume: their numbers and points.
+    fn solid(&self) -> impl Iterator<Item = (usize, &[i64])> {
+        let mut start = 0;
+        let cells = self.types.iter().zip(&self.ends).enumerate().map(move |(cell, (&kind, &end))| {
+            let end = usize::try_from(end).unwrap_or(usize::MAX);
+            let listed = self.connectivity.get(start..end).unwrap_or_default();
+            start = end;
+            (cell, kind, listed)
+        });
+        cells.filter(|(_, kind, _)| !is_flat(*kind)).map(|(cell, _, listed)| (cell, listed))
+    }
+
+    /// Leaves out the cells that VTK's flags mark as another piece's or as hidden.
+    pub fn leave_out(&mut self, flags: &[i64]) {
+        for (kind, flags) in self.types.iter_mut().zip(flags).filter(|(kind, _)| !is_flat(**kind)) {
+            *kind = left_out_by(*flags).unwrap_or(*kind);
+        }
+    }
+
+    /// Puts the points of these cells, hexahedra of the second order, into the order that VTK has had since version 9: two edges come in
+    /// another one.
+    pub fn order_as_before_9(&mut self, cells: Vec<bool>) {
+        let mut start = 0;
+        for (swapped, &end) in cells.into_iter().zip(&self.ends) {
+            let end = usize::try_from(end).unwrap_or(usize::MAX);
+            if let Some(points @ [_, .., _]) = self.connectivity.get_mut(start..end)
+                && swapped
+                && points.len() == 27
+            {
+                points.swap(18, 19);
+            }
+            start = end;
+        }
+    }
+
+    /// Leaves out the cells with a point that is hidden.
+    pub fn hide(&mut self, hidden: &[bool]) {
+        let is_hidden = |point: &i64| {
+            usize::try_from(*point).ok().and_then(|p| hidden.get(p)).is_some_and(|hidden| *hidden)
+        };
+        let cells: Vec<usize> =
+            self.solid().filter(|(_, listed)| listed.iter().any(is_hidden)).map(|(cell, _)| cell).collect();
+        cells.into_iter().for_each(|cell| self.types[cell] = HIDDEN);
+    }
+}
+
+fn split(
+    CellList { types, ends, connectivity }: &CellList,
+    numbering: &Numbering,
+    memory: &MemoryLimit,
+) -> Result<Split, ReadReason> {
+    let mut split = Split::default();
+    if !types.is_empty() && types.iter().all(|kind| [HIDDEN, GHOST].contains(kind)) {
+        split.describe(types);
+        return Ok(split);
+    }
+    let tets = most_tets(types)?;
+    let room = usize::try_from(tets).unwrap_or(usize::MAX);
+    if types.len() > u32::MAX as usize || room > u32::MAX as usize {
+        return Err(ReadReason::TooLarge { what: "cells".into(), limit: u64::from(u32::MAX) });
+    }
+    // With the number of its cell.
+    memory.take(20 * tets)?;
+    split.tets.reserve_exact(room);
+    let (mut start, mut recipes) = (0, Recipes::default());
+    let (mut vertices, mut known) = (Vec::new(), BitSet::default());
+    for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
+        let end = usize::try_from(end).unwrap_or(usize::MAX);
+        let listed = connectivity.get(start..end);
+        let listed = listed.ok_or_else(|| ReadReason::Missing(format!("a point of cell {cell}")))?;
+        start = end;
+        let first = split.tets.len();
+        if let Some((recipe, middles)) = recipes.with_middles(kind) {
+            vertices.clear();
+            for &point in listed {
+                vertices.push(numbering.of(cell, point)?);
+            }
+            match vertices.as_slice() {
+                &[a, b, c, d] if kind == TETRAHEDRON => split.tets.push([a, b, c, d]),
+                vertices => recipe.split(vertices, &mut split.tets),
+            }
+            for (point, corners) in middles {
+                let vertex = |p: &u8| vertices[usize::from(*p)];
+                if known.insert(vertex(point)) {
+                    split.input.middles.push(vertex(point), corners.iter().map(vertex));
+                }
+            }
+        }
+        split.came_from(cell, first);
+    }
+    if split.tets.len() < split.tets.capacity() / 2 {
+        split.tets.shrink_to_fit();
+    }
+    split.describe(types);
+    Ok(split)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbering(points: usize) -> Numbering {
+        Numbering::From { first: 100, points }
+    }
+
+    #[test]
+    fn cells_without_a_volume_are_left_out_and_fields_follow() {
+        let types = [5, 10, 12];
+        let connectivity: Vec<i64> = (0..3).chain(0..4).chain(0..8).collect();
+        let ends = [3, 7, 15];
+        assert_eq!(checked_ends(&types, &ends), Ok(15));
+        let cells = CellList { types: types.to_vec(), ends: ends.to_vec(), connectivity };
+        let split = cells.split(&numbering(8), &MemoryLimit::default()).unwrap();
+        assert_eq!((split.tets.len(), split.tets[0]), (7, [100, 101, 102, 103]));
+        let mut fields = [Field::new("m", vec![5.0, 6.0, 7.0]), Field::new("only named", Vec::new())];
+        split.spread(&mut fields);
+        assert_eq!(fields[0].values, [6.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0]);
+        assert!(fields[1].values.is_empty());
+        let cells = &split.input.cells;
+        assert_eq!([0, 6].map(|tet| cells.cell_of(tet).to_string()), ["1 (tetrahedron)", "2 (hexahedron)"]);
+        assert_eq!(split.input.lines(), ["left out: 1 triangle"]);
+    }
+
+    #[test]
+    fn cells_of_any_order_are_known_by_their_points() {
+        let (mut types, ends) = ([71, 10, 71, 71, 72], [4, 8, 18, 38, 46]);
+        assert!(depend_on_points(&types));
+        resolve_orders(&mut types, &ends);
+        assert_eq!(types, [10, 10, 24, 710_020, 12]);
+        let refused = most_tets(&types).unwrap_err().to_string();
+        assert!(refused.contains("1 Lagrange tetrahedron of 20 points"), "{refused}");
+    }
+
+    #[test]
+    fn cells_that_are_wrong_are_refused() {
+        assert_eq!(most_tets(&[10, 42]), Err(ReadReason::CellTypes(vec![(10, 1), (42, 1)])));
+        assert_eq!(most_tets(&[5, 5]), Err(ReadReason::CellTypes(vec![(5, 2)])));
+        assert_eq!(most_tets(&[]), Ok(0));
+        let wrong = |ends: &[i64]| checked_ends(&[10, 12], ends).unwrap_err().to_string();
+        assert!(wrong(&[4, 8]).contains("cell 1, a hexahedron, has 4 points, not 8"));
+        assert!(wrong(&[5, 13]).contains("cell 0, a tetrahedron, has 5 points, not 4"));
+        assert!(wrong(&[-1, 3]).contains("before it begins"));
+        let flat = checked_ends(&[1], &[4]).unwrap_err().to_string();
+        assert!(flat.contains("cell 0, a vertex, has 4 points, not 1"), "{flat}");
+        assert!(wrong(&[4, i64::MIN]).contains("before it begins"));
+        let split = |connectivity: &[i64]| {
+            let cells = CellList { types: vec![10], ends: vec![4], connectivity: connectivity.to_vec() };
+            cells.split(&numbering(4), &MemoryLimit::default())
+        };
+        let missing = |point| split(&[0, 1, 2, point]).unwrap_err();
+        assert_eq!(missing(4), ReadReason::MissingPoint { cell: 0, point: 4, points: 4 });
+        assert_eq!(missing(-1), ReadReason::MissingPoint { cell: 0, point: -1, points: 4 });
+        assert!(matches!(split(&[0, 1]), Err(ReadReason::Missing(_))));
+    }
+}

@@ -1,0 +1,170 @@
+//! A mesh as the files of meshers list it, before its cells are split.
+
+use std::collections::BTreeMap;
+
+use crate::cells::{self, CellList, Numbering};
+use crate::error::ReadReason;
+use crate::fields::{Collector, check_finite, check_finite_cells};
+use crate::{CellData, ReadOptions, points_from};
+use tetralod::mesh::{Field, MeshInput, TetMesh};
+
+/// Points, cells and fields as they were read.
+pub(super) struct Draft<'a> {
+    pub options: &'a ReadOptions,
+    pub coordinates: Vec<f64>,
+    list: CellList,
+    pub fields: Collector<'a>,
+    pub cell_fields: Collector<'a>,
+    /// How many cells without a volume there are of each of VTK's types; they are left out.
+    flat: BTreeMap<i64, u64>,
+    /// What is left out, in words.
+    pub notes: Vec<String>,
+    /// What is left out is noted here.
+    pub input: MeshInput,
+}
+
+impl<'a> Draft<'a> {
+    pub fn new(options: &'a ReadOptions) -> Self {
+        let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options));
+        let (coordinates, list, notes) = (Vec::new(), CellList::default(), Vec::new());
+        let input = MeshInput::default();
+        Self { options, coordinates, list, fields, cell_fields, flat: BTreeMap::new(), notes, input }
+    }
+
+    /// How many cells there are.
+    pub fn cells(&self) -> usize {
+        self.list.types.len()
+    }
+
+    /// Counts cells of VTK's type `kind`, which have no volume.
+    pub fn add_flat(&mut self, kind: i64, count: u64) {
+        *self.flat.entry(kind).or_default() += count;
+    }
+
+    /// Which of so many points a cell uses; all if there are no cells.
+    pub fn used(&self, points: usize) -> Vec<bool> {
+        let mut used = vec![self.list.connectivity.is_empty(); points];
+        for &point in &self.list.connectivity {
+            if let Some(used) = usize::try_from(point).ok().and_then(|point| used.get_mut(point)) {
+                *used = true;
+            }
+        }
+        used
+    }
+
+    /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has.
+    pub fn add_cell(&mut self, kind: i64, points: impl IntoIterator<Item = i64>) {
+        self.list.types.push(kind);
+        self.list.connectivity.extend(points);
+        self.list.ends.push(self.list.connectivity.len() as i64);
+    }
+
+    /// Keeps an array with values at points.
+    pub fn at_points(
+        &mut self,
+        name: &str,
+        components: usize,
+        values: Vec<f64>,
+        integer: bool,
+    ) -> Result<(), ReadReason> {
+        self.read_at_points(name, components, integer, || Ok(values))
+    }
+
+    /// The same with values that are read only if they are wanted.
+    pub fn read_at_points(
+        &mut self,
+        name: &str,
+        components: usize,
+        integer: bool,
+        read: impl FnOnce() -> Result<Vec<f64>, ReadReason>,
+    ) -> Result<(), ReadReason> {
+        if let Some(claim) = self.fields.claim(name, components)? {
+            return self.fields.fill(claim, read()?, integer, "");
+        }
+        Ok(())
+    }
+
+    /// Keeps an array with values at cells, if that is wanted.
+    pub fn at_cells(
+        &mut self,
+        name: &str,
+        components: usize,
+        values: Vec<f64>,
+        integer: bool,
+    ) -> Result<(), ReadReason> {
+        self.read_at_cells(name, components, integer, || Ok(values))
+    }
+
+    /// The same with values that are read only if they are wanted.
+    pub fn read_at_cells(
+        &mut self,
+        name: &str,
+        components: usize,
+        integer: bool,
+        read: impl FnOnce() -> Result<Vec<f64>, ReadReason>,
+    ) -> Result<(), ReadReason> {
+        if self.options.cells == CellData::LeaveOut {
+            return Ok(());
+        }
+        match self.cell_fields.claim(name, components)? {
+            Some(claim) if self.options.cells == CellData::Names => self.cell_fields.keep_names(claim, ""),
+            Some(claim) => self.cell_fields.fill(claim, read()?, integer, "")?,
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// The mesh. Without cells it has points alone.
+    pub fn finish(mut self) -> Result<TetMesh, ReadReason> {
+        let memory = &self.options.memory;
+        memory.take(8 * self.coordinates.len() as u64)?;
+        let positions = points_from(&self.coordinates);
+        if positions.len() > u32::MAX as usize {
+            return Err(ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) });
+        }
+        let fields = expect_values(self.fields.fields, positions.len())?;
+        let has_flat = self.flat.iter().any(|(kind, count)| *count > 0 && !cells::are_points(&[*kind]));
+        if self.list.types.is_empty() && has_flat {
+            return Err(ReadReason::CellTypes(self.flat.into_iter().collect()));
+        }
+        let others = [self.fields.others, std::mem::take(&mut self.cell_fields.others)];
+        let [other_fields, other_cell_fields] = others;
+        self.input.other_fields = other_fields;
+        if self.list.types.is_empty() {
+            check_finite(&positions, &fields, &|| None)?;
+            return Ok(TetMesh {
+                positions,
+                fields,
+                input: self.input,
+                notes: self.notes,
+                ..TetMesh::default()
+            });
+        }
+        if !fields.is_empty() {
+            self.cell_fields.drop_first();
+        }
+        check_finite(&positions, &fields, &|| Some(self.list.used(positions.len())))?;
+        let cells = self.list.types.len();
+        cells::checked_ends(&self.list.types, &self.list.ends)?;
+        let numbering = Numbering::From { first: 0, points: positions.len() };
+        let split = self.list.split(&numbering, memory)?;
+        let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
+        check_finite_cells(&cell_fields, |_| true)?;
+        split.spread(&mut cell_fields);
+        let mut input = MeshInput { other_cell_fields, ..self.input };
+        input.append(split.input);
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input, notes: self.notes })
+    }
+}
+
+/// Checks that fields have as many values as there are points or cells, or none.
+fn expect_values(fields: Vec<Field>, expected: usize) -> Result<Vec<Field>, ReadReason> {
+    match fields.iter().find(|field| !field.values.is_empty() && field.values.len() != expected) {
+        Some(Field { name, values, .. }) => Err(ReadReason::Count {
+            what: format!("values of \"{name}\""),
+            expected: expected as u64,
+            found: values.len() as u64,
+        }),
+        None => Ok(fields),
+    }
+}

@@ -1,0 +1,298 @@
+//! Exodus II (`.exo`, `.ex2`, `.e`): blocks of elements with variables at nodes and elements, in netCDF of any version.
+//!
+//! The numbers of blocks become the field `block` at cells. Variables whose names differ in a last letter x, y or z are a vector.
+
+use std::collections::HashMap;
+
+use netcdf_reader::{NcFile, NcGroup, NcSliceInfo, NcSliceInfoElem, NcVariable};
+
+use crate::ReadOptions;
+use crate::error::{At, ReadError, ReadReason};
+use crate::formats::draft::Draft;
+use crate::formats::exodus_cells::{Element, element};
+use crate::formats::hdf5::{checked_times, netcdf_reason};
+use tetralod::mesh::TetMesh;
+
+/// A file.
+struct Reader<'a> {
+    file: &'a NcFile,
+    root: &'a NcGroup,
+    /// Those of the root, by their names: there may be one for each variable of each block.
+    variables: HashMap<&'a str, &'a NcVariable>,
+    step: u64,
+}
+
+/// A block of elements that have a volume.
+struct Block {
+    /// From 1, in the names of arrays.
+    number: usize,
+    elements: usize,
+}
+
+/// The times of the steps; none if there are no steps.
+pub(super) fn times(file: &NcFile) -> Result<Vec<f64>, ReadError> {
+    let reader = Reader::new(file, 0).at(String::new)?;
+    let times = reader.values_if("time_whole").and_then(|times| checked_times(times.unwrap_or_default()));
+    times.at(|| "time_whole".into())
+}
+
+/// Reads a mesh.
+pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let times = times(file)?;
+    if options.step >= times.len().max(1) {
+        let what = format!("time step {} of {}", options.step, times.len().max(1));
+        return Err(ReadReason::Missing(what)).at(String::new);
+    }
+    let reader = Reader::new(file, options.step as u64).at(String::new)?;
+    let mut draft = Draft::new(options);
+    draft.coordinates = reader.coordinates().at(|| "coordinates".into())?;
+    let blocks = reader.blocks(&mut draft)?;
+    if !times.is_empty() {
+        reader.variables_at_nodes(&mut draft)?;
+        reader.variables_at_elements(&blocks, &mut draft)?;
+    }
+    let numbers = reader.numbers_of_blocks(&blocks).at(|| "eb_prop1".into())?;
+    draft.at_cells("block", 1, numbers, true).at(|| "eb_prop1".into())?;
+    let mut mesh = draft.finish().at(|| "element blocks".into())?;
+    let time = times.get(options.step).copied();
+    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+    Ok(mesh)
+}
+
+impl<'a> Reader<'a> {
+    fn new(file: &'a NcFile, step: u64) -> Result<Self, ReadReason> {
+        let root = file.root_group().map_err(netcdf_reason)?;
+        // The first one of a name counts.
+        let variables = root.variables.iter().rev().map(|variable| (variable.name(), variable)).collect();
+        Ok(Self { file, root, variables, step })
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.variables.contains_key(name)
+    }
+
+    fn variable(&self, name: &str) -> Result<&NcVariable, ReadReason> {
+        let variable = self.variables.get(name).copied();
+        variable.ok_or_else(|| ReadReason::Missing(format!("variable \"{name}\"")))
+    }
+
+    fn size(&self, name: &str) -> Result<u64, ReadReason> {
+        let dimension = self.root.dimension(name);
+        let missing = || ReadReason::Unsupported {
+            what: format!("a file in HDF5 or netCDF without \"{name}\", so neither VTKHDF nor Exodus,"),
+            remedy: "give one of these, or save it as .vtu".into(),
+        };
+        dimension.map(|dimension| dimension.size).ok_or_else(missing)
+    }
+
+    /// All values of a variable with these first indices.
+    fn values(&self, name: &str, first: &[u64]) -> Result<Vec<f64>, ReadReason> {
+        let variable = self.variable(name)?;
+        let mut selection = NcSliceInfo::all(variable.ndim());
+        if first.len() > selection.selections.len() {
+            return Err(ReadReason::Syntax(format!("variable \"{name}\" has too few dimensions")));
+        }
+        for (of, index) in selection.selections.iter_mut().zip(first) {
+            *of = NcSliceInfoElem::Index(*index);
+        }
+        let values = self.file.read_variable_slice_as_f64(name, &selection).map_err(netcdf_reason)?;
+        Ok(values.into_iter().collect())
+    }
+
+    fn values_if(&self, name: &str) -> Result<Option<Vec<f64>>, ReadReason> {
+        self.has(name).then(|| self.values(name, &[])).transpose()
+    }
+
+    fn coordinates(&self) -> Result<Vec<f64>, ReadReason> {
+        let axes = self.size("num_dim")?;
+        if axes != 3 {
+            let what = format!("a mesh in {axes} dimensions");
+            return Err(ReadReason::Unsupported { what, remedy: "give a mesh of volumes".into() });
+        }
+        // Old files have one array.
+        let mut along = Vec::new();
+        for (axis, name) in (0..).zip(["coordx", "coordy", "coordz"]) {
+            let is_old = self.has("coord");
+            along.push(if is_old { self.values("coord", &[axis])? } else { self.values(name, &[])? });
+        }
+        let points = along[0].len();
+        if let Some(other) = along.iter().find(|axis| axis.len() != points) {
+            let what = "coordinates along an axis".into();
+            return Err(ReadReason::Count { what, expected: points as u64, found: other.len() as u64 });
+        }
+        Ok((0..points).flat_map(|i| along.iter().map(move |axis| axis[i])).collect())
+    }
+
+    /// Reads the blocks of elements. What has no volume is left out.
+    fn blocks(&self, draft: &mut Draft<'_>) -> Result<Vec<Block>, ReadError> {
+        let number = |name: &str, start: &str| name.strip_prefix(start)?.parse::<usize>().ok();
+        let names = || self.root.variables.iter().map(NcVariable::name);
+        if let Some(faces) = names().find(|name| number(name, "facconn").is_some()) {
+            let polyhedra =
+                self.variable(faces).map_or(0, |faces| faces.shape().first().copied().unwrap_or(0));
+            return Err(ReadReason::CellTypes(vec![(POLYHEDRON, polyhedra)])).at(|| faces.to_owned());
+        }
+        let mut numbers: Vec<usize> = names().filter_map(|name| number(name, "connect")).collect();
+        numbers.sort_unstable();
+        let mut blocks = Vec::new();
+        for number in numbers {
+            let name = format!("connect{number}");
+            if let Some(elements) = self.block(&name, draft).at(|| name.clone())? {
+                blocks.push(Block { number, elements });
+            }
+        }
+        Ok(blocks)
+    }
+
+    /// Reads a block; returns how many elements it has, or none if they have no volume.
+    fn block(&self, name: &str, draft: &mut Draft<'_>) -> Result<Option<usize>, ReadReason> {
+        let variable = self.variable(name)?;
+        let kind = variable.attribute("elem_type").and_then(|kind| kind.value.as_string());
+        let kind = kind.ok_or_else(|| ReadReason::Missing("attribute elem_type".into()))?;
+        let kind = kind.trim_end_matches('\0');
+        let shape = variable.shape();
+        let points = shape.get(1).map_or(1, |points| usize::try_from(*points).unwrap_or(usize::MAX));
+        let unknown = || ReadReason::Unsupported {
+            what: format!("a block of elements \"{kind}\" of {points} points"),
+            remedy:
+                "save the mesh with tetrahedra, hexahedra, wedges and pyramids of the first or second order"
+                    .into(),
+        };
+        let Element::Solid(cell, order) = element(kind, points).ok_or_else(unknown)? else { return Ok(None) };
+        let list = self.values(name, &[])?;
+        for of_element in list.chunks_exact(points) {
+            // They are numbered from 1.
+            draft.add_cell(cell, order.iter().map(|&p| (of_element[p] as i64).saturating_sub(1)));
+        }
+        Ok(Some(list.len() / points))
+    }
+
+    /// The number of each element's block, by which users know it.
+    fn numbers_of_blocks(&self, blocks: &[Block]) -> Result<Vec<f64>, ReadReason> {
+        let known = self.values_if("eb_prop1")?.unwrap_or_default();
+        let number =
+            |block: &Block| known.get(block.number.wrapping_sub(1)).copied().unwrap_or(block.number as f64);
+        Ok(blocks.iter().flat_map(|block| std::iter::repeat_n(number(block), block.elements)).collect())
+    }
+
+    /// The names in an array of text.
+    fn names(&self, name: &str) -> Result<Vec<String>, ReadReason> {
+        if !self.has(name) {
+            return Ok(Vec::new());
+        }
+        let names = self.file.read_variable_as_strings(name).map_err(netcdf_reason)?;
+        let trimmed = |name: String| name.trim_matches(|c: char| c == '\0' || c.is_whitespace()).to_owned();
+        Ok(names.into_iter().map(trimmed).collect())
+    }
+
+    fn variables_at_nodes(&self, draft: &mut Draft<'_>) -> Result<(), ReadError> {
+        let names = self.names("name_nod_var").at(|| "name_nod_var".into())?;
+        let points = draft.coordinates.len() / 3;
+        for (name, parts) in joined(&names) {
+            let place = || format!("variable \"{name}\" at nodes");
+            let read = |part: usize| {
+                // Old files have one array.
+                let values = if self.has("vals_nod_var") {
+                    self.values("vals_nod_var", &[self.step, part as u64])?
+                } else {
+                    self.values(&format!("vals_nod_var{}", part + 1), &[self.step])?
+                };
+                expect(points, values)
+            };
+            draft.read_at_points(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
+        }
+        Ok(())
+    }
+
+    fn variables_at_elements(&self, blocks: &[Block], draft: &mut Draft<'_>) -> Result<(), ReadError> {
+        let names = self.names("name_elem_var").at(|| "name_elem_var".into())?;
+        for (name, parts) in joined(&names) {
+            let place = || format!("variable \"{name}\" at elements");
+            // Blocks need not have each variable; what they do not have is 0.
+            let read = |part: usize| {
+                let mut values = Vec::new();
+                for block in blocks {
+                    let array = format!("vals_elem_var{}eb{}", part + 1, block.number);
+                    if self.has(&array) {
+                        values.extend(expect(block.elements, self.values(&array, &[self.step])?)?);
+                    } else {
+                        values.resize(values.len() + block.elements, 0.0);
+                    }
+                }
+                Ok(values)
+            };
+            draft.read_at_cells(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
+        }
+        Ok(())
+    }
+}
+
+/// VTK's number for a polyhedron.
+const POLYHEDRON: i64 = 42;
+
+fn expect(expected: usize, values: Vec<f64>) -> Result<Vec<f64>, ReadReason> {
+    if values.len() == expected {
+        return Ok(values);
+    }
+    let (expected, found) = (expected as u64, values.len() as u64);
+    Err(ReadReason::Count { what: "values".into(), expected, found })
+}
+
+/// The values of the parts of a vector, of one tuple behind the other.
+fn interleaved(
+    parts: &[usize],
+    read: impl Fn(usize) -> Result<Vec<f64>, ReadReason>,
+) -> Result<Vec<f64>, ReadReason> {
+    let arrays = parts.iter().map(|&part| read(part)).collect::<Result<Vec<_>, _>>()?;
+    if let [_] = arrays.as_slice() {
+        return Ok(arrays.into_iter().flatten().collect());
+    }
+    let tuples = arrays.iter().map(Vec::len).min().unwrap_or(0);
+    Ok((0..tuples).flat_map(|i| arrays.iter().map(move |array| array[i])).collect())
+}
+
+/// The variables with the numbers of their arrays, those of a vector together.
+fn joined(names: &[String]) -> Vec<(String, Vec<usize>)> {
+    let mut list = Vec::new();
+    let mut at = 0;
+    while let Some(name) = names.get(at) {
+        let vector = names.get(at..at + 3).and_then(vector_of);
+        let count = if vector.is_some() { 3 } else { 1 };
+        list.push((vector.unwrap_or(name).to_owned(), (at..at + count).collect()));
+        at += count;
+    }
+    list
+}
+
+/// The name of the vector whose components have these names, if they are such.
+fn vector_of(names: &[String]) -> Option<&str> {
+    let start = |(name, axis): (&'_ String, char)| -> Option<usize> {
+        let start = name.strip_suffix(axis).or_else(|| name.strip_suffix(axis.to_ascii_uppercase()));
+        start.map(str::len)
+    };
+    let ends = names.iter().zip(['x', 'y', 'z']).map(start).collect::<Option<Vec<_>>>()?;
+    let first = names.first()?.get(..*ends.first()?)?;
+    let same = names.iter().zip(&ends).all(|(name, &end)| name.get(..end) == Some(first));
+    let stem = first.trim_end_matches(['_', '-', '.', ' ']);
+    (same && !stem.is_empty()).then_some(stem)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(list: &[&str]) -> Vec<(String, Vec<usize>)> {
+        joined(&list.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn components_are_joined_and_nothing_else() {
+        let of = |name: &str, parts: &[usize]| (name.to_owned(), parts.to_vec());
+        assert_eq!(names(&["T", "DISPLX", "DISPLY", "DISPLZ"]), [of("T", &[0]), of("DISPL", &[1, 2, 3])]);
+        assert_eq!(names(&["vel_x", "vel_y", "vel_z", "ü"]), [of("vel", &[0, 1, 2]), of("ü", &[3])]);
+        assert_eq!(names(&["x", "y", "z"]), [of("x", &[0]), of("y", &[1]), of("z", &[2])]);
+        assert_eq!(names(&["ax", "ay", "bz"]).len(), 3);
+        assert_eq!(names(&["ax", "ay"]).len(), 2);
+        assert_eq!(names(&["", "", ""]).len(), 3);
+    }
+}

@@ -1,0 +1,126 @@
+//! Formats of meshers, of imaging and in HDF5, which the builder in pages does not have (features `formats` and `hdf5`).
+//!
+//! Each is recognised by its first words, but for TetGen's, whose files are lists of numbers.
+
+mod draft;
+#[cfg(feature = "hdf5")]
+mod exodus;
+#[cfg(feature = "hdf5")]
+mod exodus_cells;
+mod gmsh;
+mod gmsh_cells;
+mod gmsh_sections;
+mod gmsh_views;
+#[cfg(feature = "hdf5")]
+pub(super) mod hdf5;
+mod medit;
+mod medit_binary;
+mod medit_cells;
+mod metaimage;
+mod netgen;
+mod nrrd;
+mod scanner;
+pub(super) mod tetgen;
+mod volume;
+#[cfg(feature = "hdf5")]
+mod vtkhdf;
+
+use std::path::Path;
+
+use crate::error::ReadError;
+use crate::{Beside, ReadOptions};
+use tetralod::mesh::TetMesh;
+
+/// A format that is recognised by its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Gmsh,
+    Medit,
+    MeditBinary,
+    Netgen,
+    Nrrd,
+    MetaImage,
+}
+
+impl Format {
+    /// The format of a file that begins with these bytes, if it is one of these.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        let start = bytes.trim_ascii_start();
+        if start.starts_with(nrrd::MAGIC) {
+            return Some(Self::Nrrd);
+        }
+        if gmsh::is_first(start) {
+            return Some(Self::Gmsh);
+        }
+        if medit_binary::is_first(bytes) {
+            return Some(Self::MeditBinary);
+        }
+        if metaimage::is_header(start) {
+            return Some(Self::MetaImage);
+        }
+        match scanner::Scanner::with_comments(bytes).next_word().ok()?? {
+            medit::FIRST => Some(Self::Medit),
+            netgen::FIRST => Some(Self::Netgen),
+            _ => None,
+        }
+    }
+
+    /// As [`Survey::format`](crate::Survey::format) calls it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Gmsh => "gmsh",
+            Self::Medit | Self::MeditBinary => "medit",
+            Self::Netgen => "netgen",
+            Self::Nrrd => "nrrd",
+            Self::MetaImage => "metaimage",
+        }
+    }
+}
+
+/// What the format of these bytes is called, if it is one of these.
+pub(super) fn name(bytes: &[u8]) -> Option<&'static str> {
+    #[cfg(feature = "hdf5")]
+    if let Some(name) = hdf5::name(bytes) {
+        return Some(name);
+    }
+    Format::of(bytes).map(Format::name)
+}
+
+/// Reads the bytes of a file called `name`; none if they are of no format that is known here.
+pub(super) fn read(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Option<Result<TetMesh, ReadError>> {
+    #[cfg(feature = "hdf5")]
+    if hdf5::is_known(bytes) {
+        return Some(hdf5::read(bytes, options));
+    }
+    Some(match Format::of(bytes)? {
+        Format::Gmsh => gmsh::read(bytes, options),
+        Format::Medit => medit::read(bytes, &sibling(name, "sol"), options, beside),
+        Format::MeditBinary => medit_binary::read(bytes, &sibling(name, "solb"), options, beside),
+        Format::Netgen => netgen::read(bytes, options),
+        Format::Nrrd => nrrd::read(bytes, options, beside),
+        Format::MetaImage => metaimage::read(bytes, options, beside),
+    })
+}
+
+/// The times of the steps in the file at `path`; fewer than two if it is of no format that is known to have some.
+pub(super) fn times_at(path: &Path) -> Result<Vec<f64>, ReadError> {
+    #[cfg(feature = "hdf5")]
+    {
+        let times = hdf5::times_at(path)?;
+        if !times.is_empty() {
+            return Ok(times);
+        }
+    }
+    Ok(gmsh::times_at(path))
+}
+
+/// The name of the file beside the one called `name` that has another ending.
+fn sibling(name: &str, ending: &str) -> String {
+    let path = Path::new(name).with_extension(ending);
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

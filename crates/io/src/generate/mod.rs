@@ -1,0 +1,208 @@
+//! Volumes made by formula, of any size and the same on every platform: what the demo, the docs and the tests use.
+//!
+//! Grids are made layer by layer ([`LayeredGrid`]), so that those that fit no memory can be written to files.
+
+mod abc_flow;
+mod bucky;
+mod helix;
+mod hydrogen;
+mod marschner_lobb;
+mod sphere_flow;
+
+pub use hydrogen::Orbital;
+
+use tetralod::mesh::{LayeredGrid, TetMesh};
+use thiserror::Error;
+
+/// The names of what can be generated, each with a sentence about it.
+pub const VOLUMES: [(&str, &str); 6] = [
+    ("bucky", "density of the carbon molecule C60: 60 blobs on a truncated icosahedron"),
+    ("marschner-lobb", "density of Marschner and Lobb's test signal: waves at the limit of a 40³ grid"),
+    ("hydrogen", "density and amplitude of an orbital of the hydrogen atom"),
+    ("abc-flow", "pressure and velocity of the vortices of Arnold, Beltrami and Childress, drifting in time"),
+    ("helix", "density and charge of a model of DNA; the grid is 7/3 times as high as wide"),
+    ("sphere-flow", "pressure and speed of a flow past a sphere: tetrahedra, graded, around a hole"),
+];
+
+/// Smallest and largest size of a grid.
+const GRID_SIZES: [u32; 2] = [2, 4096];
+
+/// Why nothing was generated.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum GenerateError {
+    /// No generator has this name.
+    #[error("nothing named \"{0}\" can be generated; choose one of: {names}", names = VOLUMES.map(|(name, _)| name).join(", "))]
+    UnknownName(String),
+    /// The size is too small or too large.
+    #[error("{name} cannot have size {size}; choose one from {} to {}", .limits[0], .limits[1])]
+    Size {
+        /// The generator.
+        name: &'static str,
+        /// What was asked for.
+        size: u32,
+        /// Smallest and largest size.
+        limits: [u32; 2],
+    },
+    /// A grid has too many points for a mesh.
+    #[error(
+        "{points} points are more than a mesh can number; write the grid (.vti), or choose a smaller size"
+    )]
+    Points {
+        /// Those of the grid.
+        points: u64,
+    },
+    /// No orbital has these quantum numbers.
+    #[error(
+        "there is no orbital {n},{l},{m}: n must be 1 to {}, l less than n, and m from -l to l",
+        Orbital::MAX_N
+    )]
+    Orbital {
+        /// The principal number.
+        n: u32,
+        /// The azimuthal number.
+        l: u32,
+        /// The magnetic number.
+        m: i32,
+    },
+}
+
+/// What can be chosen of a volume beside its size.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Which orbital `hydrogen` is.
+    pub orbital: Orbital,
+    /// The part of its period that `abc-flow` has drifted.
+    pub phase: f64,
+}
+
+/// What was generated.
+#[derive(Debug)]
+pub enum Volume {
+    /// Values on a grid, not yet made.
+    Grid(LayeredGrid),
+    /// Tetrahedra.
+    Mesh(Box<TetMesh>),
+}
+
+impl Volume {
+    /// The volume as tetrahedra, in memory.
+    ///
+    /// # Errors
+    /// If a grid has more points than a mesh can number.
+    pub fn into_mesh(self) -> Result<TetMesh, GenerateError> {
+        match self {
+            Self::Mesh(mesh) => Ok(*mesh),
+            Self::Grid(grid) if u32::try_from(grid.points()).is_ok() => Ok(grid.to_mesh()),
+            Self::Grid(grid) => Err(GenerateError::Points { points: grid.points() }),
+        }
+    }
+}
+
+/// Generates the volume called `name` (see [`VOLUMES`]) with `size` points along an edge; of a box that is no cube, its shortest.
+///
+/// # Errors
+/// If nothing has this name, or it cannot have this size.
+pub fn volume(name: &str, size: u32, options: &Options) -> Result<Volume, GenerateError> {
+    let Some((name, _)) = VOLUMES.into_iter().find(|(known, _)| *known == name) else {
+        return Err(GenerateError::UnknownName(name.to_owned()));
+    };
+    if name == "sphere-flow" {
+        return sphere_flow(size).map(|mesh| Volume::Mesh(Box::new(mesh)));
+    }
+    check_size(name, size, GRID_SIZES)?;
+    Ok(Volume::Grid(match name {
+        "bucky" => bucky::layers(size),
+        "marschner-lobb" => marschner_lobb::layers(size),
+        "hydrogen" => hydrogen::layers(size, options.orbital),
+        "abc-flow" => abc_flow::layers(size, options.phase),
+        _ => helix::layers(size),
+    }))
+}
+
+/// Generates the volume called `name` (see [`VOLUMES`]) as a mesh.
+///
+/// # Errors
+/// If nothing has this name, it cannot have this size, or has too many points.
+pub fn by_name(name: &str, size: u32) -> Result<TetMesh, GenerateError> {
+    volume(name, size, &Options::default())?.into_mesh()
+}
+
+/// A bucky ball: `density` on a grid of `size`³ points over the unit cube.
+///
+/// The density is the sum of exp(−d²/2σ²), σ = 0.055, over the 60 vertices of a truncated icosahedron of radius
+/// 0.35 around the cube's centre, where d is the distance to the vertex.
+///
+/// # Errors
+/// If `size` is less than 2, or there are too many points.
+pub fn bucky(size: u32) -> Result<TetMesh, GenerateError> {
+    by_name("bucky", size)
+}
+
+/// Potential flow past a sphere of radius 1 in a stream of speed 1 along x: `pressure` (the pressure coefficient
+/// 1 − speed²) and `speed`.
+///
+/// The mesh fills the box from (−4, −4, −4) to (6, 4, 4) without the sphere, so it is not convex and its boundary
+/// has two parts. Six blocks, one a side of the box, meet without seams; layers get thicker outward. There are
+/// `size` points along an edge of the box and as many layers of points from sphere to box.
+///
+/// # Errors
+/// If `size` is less than 3, or there are too many points.
+pub fn sphere_flow(size: u32) -> Result<TetMesh, GenerateError> {
+    check_size("sphere-flow", size, sphere_flow::SIZES)?;
+    Ok(sphere_flow::mesh(size))
+}
+
+fn check_size(name: &'static str, size: u32, limits: [u32; 2]) -> Result<(), GenerateError> {
+    if (limits[0]..=limits[1]).contains(&size) {
+        Ok(())
+    } else {
+        Err(GenerateError::Size { name, size, limits })
+    }
+}
+
+/// The volume of a mesh, for tests.
+#[cfg(test)]
+fn space(mesh: &TetMesh) -> f64 {
+    let volumes = mesh.tets.iter().map(|tet| {
+        let p = tet.map(|v| mesh.positions[v as usize]);
+        let [u, v, w] = [1, 2, 3].map(|k| [0, 1, 2].map(|i| p[k][i] - p[0][i]));
+        ((u[1] * v[2] - u[2] * v[1]) * w[0]
+            + (u[2] * v[0] - u[0] * v[2]) * w[1]
+            + (u[0] * v[1] - u[1] * v[0]) * w[2])
+            / 6.0
+    });
+    volumes.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tetralod::mesh::check;
+
+    #[test]
+    fn all_volumes_are_valid_meshes_of_their_size() {
+        for (name, _) in VOLUMES {
+            for size in [3, 4, 7] {
+                let mesh = by_name(name, size).unwrap();
+                check(&mesh).unwrap();
+                let all = |field: &tetralod::mesh::Field| field.values.iter().all(|v| v.is_finite());
+                assert!(!mesh.fields.is_empty() && mesh.fields.iter().all(all), "{name}");
+            }
+        }
+        assert_eq!(by_name("bucky", 3).unwrap().tets.len(), 48);
+        assert_eq!(by_name("sphere-flow", 3).unwrap().tets.len(), 288);
+    }
+
+    #[test]
+    fn names_and_sizes_are_checked() {
+        let unknown = by_name("buck", 3).unwrap_err().to_string();
+        assert!(VOLUMES.iter().all(|(name, _)| unknown.contains(name)), "{unknown}");
+        let wrong = [("bucky", 0), ("bucky", 1), ("helix", 4097), ("sphere-flow", 2), ("sphere-flow", 2000)];
+        for (name, size) in wrong {
+            let error = by_name(name, size).unwrap_err().to_string();
+            assert!(error.contains("choose one from"), "{error}");
+        }
+        let points = 1626_u64.pow(3);
+        assert_eq!(bucky(1626), Err(GenerateError::Points { points }));
+    }
+}

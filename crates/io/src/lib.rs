@@ -1,0 +1,414 @@
+//! Exchange formats: meshes and grids from files, and back to VTK.
+//!
+//! | format | ending | read | written |
+//! |---|---|---|---|
+//! | VTK XML unstructured grid | `.vtu` | all encodings, several pieces | appended raw, zlib |
+//! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
+//! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured, structured and rectilinear grids, structured points | |
+//! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
+//! | VTK XML, each of these in several files | `.pvtu`, `.pvti`, `.pvtr`, `.pvts` | by [`read`]; feature `formats` | |
+//! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
+//! | Gmsh, versions 1 to 4.1 | `.msh` | text and binary; feature `formats` | |
+//! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; feature `formats` | |
+//! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
+//! | Netgen | `.vol` | feature `formats` | |
+//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal; feature `formats` | |
+//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text; feature `formats` | |
+//! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; feature `hdf5` | |
+//! | Exodus II | `.exo`, `.ex2`, `.e` | feature `hdf5` | |
+//! | VTK XML poly data | `.vtp` | | appended raw, zlib |
+//! | STL | `.stl` | | binary, triangles alone |
+//! | PLY | `.ply` | | binary, little-endian |
+//! | Wavefront | `.obj` | | without fields |
+//! | table | `.csv` | | |
+//!
+//! Regular grids are split into tetrahedra, six a cube, and carry their [`Grid`](tetralod::mesh::Grid).
+//! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
+//! `name_magnitude`. Units and times are kept where the file contains them. Arrays at cells are read where that is asked
+//! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
+//! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`].
+//! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
+//! volume are left out beside them. Readers check the file, not the mesh: see [`tetralod::mesh::repair`].
+
+#![warn(missing_docs)]
+#![deny(rustdoc::broken_intra_doc_links)]
+
+mod beside;
+mod cell_shapes;
+mod cells;
+mod error;
+mod fields;
+mod foreign;
+#[cfg(not(target_arch = "wasm32"))]
+mod formats;
+pub mod generate;
+mod image;
+mod legacy;
+mod memory;
+mod number;
+mod packed;
+mod payload;
+#[cfg(not(target_arch = "wasm32"))]
+mod pieces;
+mod pvd;
+#[cfg(not(target_arch = "wasm32"))]
+mod pvtu;
+mod raw;
+mod structured;
+mod surface;
+mod survey;
+mod time_steps;
+mod vtu;
+mod write;
+mod write_layers;
+mod xml;
+mod xz;
+
+pub use error::{ReadError, ReadReason};
+pub use image::MAX_GRID_POINTS;
+pub use memory::MemoryLimit;
+#[cfg(not(target_arch = "wasm32"))]
+pub use pieces::{PieceCounts, Pieces};
+pub use pvd::{Step, steps, write_pvd};
+pub use surface::{PointValues, PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
+pub use survey::{Survey, format_of, held_bytes, survey, survey_raw};
+pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
+pub use write::{PointArray, point_arrays, write_vti, write_vtu};
+pub use write_layers::write_vti_layers;
+
+use std::path::Path;
+
+use crate::beside::FilesOf;
+use crate::error::At;
+use crate::memory::FileBytes;
+use tetralod::mesh::{TetMesh, straighten};
+
+/// What to read of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Names of the fields to keep, a vector's name for all its components; all if none. Others are not decoded, and may be
+    /// anything: see [`MeshInput::other_fields`](tetralod::mesh::MeshInput::other_fields).
+    pub fields: Option<Vec<String>>,
+    /// Keep the first field beside those that are named, and none else if none are: the first at points, or at cells where points have
+    /// none.
+    pub first: bool,
+    /// What to do with fields at cells.
+    pub cells: CellData,
+    /// Which step to read of a file that has several (see [`Step::number`]): the first one is 0. Others have one.
+    pub step: usize,
+    /// The most memory that reading may take.
+    pub memory: MemoryLimit,
+}
+
+/// What to do with fields at cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CellData {
+    /// Leave them out.
+    #[default]
+    LeaveOut,
+    /// Keep their names alone, for messages that say how to read them.
+    Names,
+    /// Read them: see [`TetMesh::cells_to_points`].
+    Values,
+}
+
+/// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
+///
+/// The kind of a file follows from its content; only `.raw`, `.json`, `.node` and `.ele` are recognised by their names.
+///
+/// # Errors
+/// If the file cannot be read, is damaged, or holds what is not read here: see [`ReadReason`].
+pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
+    read_with(path, &ReadOptions::default())
+}
+
+/// Reads what is wanted of the mesh or grid in the file at `path`, otherwise as [`read`].
+///
+/// # Errors
+/// As [`read`]; a field that is wanted and not there is no error.
+pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let read = read_unexpanded(path, options)?;
+    expanded(read, options).at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
+}
+
+/// The same mesh with finite numbers at points that no cell uses, without cells that fold because they were cut into straight
+/// tetrahedra, and with all notes in words.
+fn settled(mut mesh: TetMesh) -> TetMesh {
+    fields::settle_unused(&mut mesh);
+    straighten(&mut mesh);
+    mesh.notes.extend(mesh.input.lines());
+    mesh
+}
+
+/// The same mesh with the points and tetrahedra of a grid.
+fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadReason> {
+    if let Some(grid) = mesh.grid.filter(|_| mesh.is_grid_alone()) {
+        options.memory.take(structured::bytes(grid.dims))?;
+    }
+    mesh.expand_grid();
+    Ok(mesh)
+}
+
+/// As [`read_with`], but a regular grid without values at its cells comes without points and tetrahedra, which follow from it: see
+/// [`TetMesh::of_grid_alone`].
+///
+/// # Errors
+/// As [`read_with`].
+pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    read_unsettled(path, options).map(settled)
+}
+
+fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let name = path.display().to_string();
+    if path.is_dir() {
+        return Err(foreign::refused_folder(path)).at(String::new).map_err(|error| in_file(error, &name));
+    }
+    let files = FilesOf::new(path, &options.memory);
+    let mut mesh = match lower_extension(path).as_str() {
+        "json" => read_raw_by_sidecar(&files, path, None, &options.memory)?,
+        "raw" => read_raw_by_sidecar(&files, &path.with_extension("json"), Some(path), &options.memory)?,
+        #[cfg(not(target_arch = "wasm32"))]
+        "node" | "ele" => formats::tetgen::read(&files, path, options)?,
+        _ => match read_ranges(path, options) {
+            Some(read) => read?,
+            None => read_in(&name, &files.load_one(path)?, options, &|file| files.load(file))?,
+        },
+    };
+    mesh.input.files.0 = files.into_read();
+    Ok(mesh)
+}
+
+/// Reads what is wanted of a file of a format that need not be read as a whole; none if it is another one.
+#[cfg(feature = "hdf5")]
+fn read_ranges(path: &Path, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    formats::hdf5::read_at(path, options)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn read_ranges(_: &Path, _: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    None
+}
+
+/// Reads a mesh or grid from the bytes of a file; `name` is used in errors alone.
+///
+/// Raw samples come in two files: see [`read_raw`].
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
+    read_bytes_with(name, bytes, &ReadOptions::default())
+}
+
+/// Reads what is wanted from the bytes of a file, otherwise as [`read_bytes`].
+///
+/// # Errors
+/// As [`read_with`], and if the file refers to others.
+pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let alone = |file: &str| {
+        let what = format!("a file that needs another (\"{file}\")");
+        Err(ReadReason::Unsupported { what, remedy: "give it by its path, with the other beside it".into() })
+    };
+    let read = read_in(name, bytes, options, &alone).map(settled)?;
+    expanded(read, options).at(String::new).map_err(|e| in_file(e, name))
+}
+
+/// Gets the bytes of another file, by its path from the folder of the one that is read.
+type Beside<'a> = &'a dyn Fn(&str) -> Result<FileBytes<'static>, ReadReason>;
+
+/// Reads a file that may refer to others.
+fn read_in(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<TetMesh, ReadError> {
+    let unpacked = packed::unpacked(bytes, &options.memory).at(String::new).map_err(|e| in_file(e, name))?;
+    let (bytes, name) = (&*unpacked, without_gz(name));
+    let start = without_mark(bytes);
+    let result = if bytes.starts_with(legacy::MAGIC) {
+        legacy::read(bytes, options)
+    } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
+        read_xml(start, options, beside)
+    } else {
+        read_other(name, bytes, options, beside)
+    };
+    result.map_err(|e| in_file(e, name))
+}
+
+/// Reads a format that is not VTK's.
+#[cfg(not(target_arch = "wasm32"))]
+fn read_other(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<TetMesh, ReadError> {
+    formats::read(name, bytes, options, beside)
+        .unwrap_or_else(|| Err(foreign::refused(name, bytes)).at(String::new))
+}
+
+#[cfg(target_arch = "wasm32")]
+fn read_other(name: &str, bytes: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
+    Err(foreign::refused(name, bytes)).at(String::new)
+}
+
+/// Reads raw samples, given their JSON sidecar:
+/// `{"dims": [2, 2, 2], "type": "uint8", "endian": "little", "spacing": [1, 1, 1], "origin": [0, 0, 0], "field": "density"}`,
+/// of which only `dims` and `type` are needed. Samples run x fastest, then y, then z. `name` is used in errors alone.
+///
+/// # Errors
+/// If the sidecar does not say what is needed, or the samples are not as many as it says.
+pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, ReadError> {
+    let options = ReadOptions::default();
+    let mesh =
+        raw::Sidecar::parse(sidecar).and_then(|s| expanded(s.mesh(samples, &options.memory)?, &options));
+    mesh.at(String::new).map_err(|e| in_file(e, name))
+}
+
+fn read_raw_by_sidecar(
+    files: &FilesOf<'_>,
+    sidecar_path: &Path,
+    samples_path: Option<&Path>,
+    memory: &MemoryLimit,
+) -> Result<TetMesh, ReadError> {
+    let name = sidecar_path.display().to_string();
+    let sidecar =
+        raw::Sidecar::parse(&files.load_one(sidecar_path)?).at(String::new).map_err(|e| in_file(e, &name))?;
+    let samples_path = match (samples_path, &sidecar.file) {
+        (Some(path), _) => path.to_owned(),
+        (None, Some(file)) => sidecar_path.with_file_name(file),
+        (None, None) => sidecar_path.with_extension("raw"),
+    };
+    let samples = files.load_one(&samples_path)?;
+    sidecar
+        .mesh(&samples, memory)
+        .at(String::new)
+        .map_err(|e| in_file(e, &samples_path.display().to_string()))
+}
+
+fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {
+    let document = xml::Document::parse(bytes)?;
+    let (mut mesh, of_pieces) = match document.kind.as_str() {
+        "UnstructuredGrid" => (vtu::read(&document, options)?, None),
+        "PUnstructuredGrid" => read_pieces(&document, options, beside)?,
+        kind => match kind.strip_prefix(IN_FILES).unwrap_or(kind) {
+            "ImageData" => image::read(&document, options, beside)?,
+            structured::RECTILINEAR | structured::CURVILINEAR => {
+                structured::read(&document, options, beside)?
+            }
+            _ => return Err(not_read(kind)).at(String::new),
+        },
+    };
+    let time = document.time().or(of_pieces);
+    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+    Ok(mesh)
+}
+
+/// What the types of documents begin with that list files with pieces.
+const IN_FILES: char = 'P';
+
+/// Reads a document with the pieces of a grid.
+type ReadFile<'a> = &'a mut dyn FnMut(&xml::Document<'_>) -> Result<(), ReadError>;
+
+/// Has `read` read the document, or the files that it lists, whose bytes count in the limit; returns the time of the first one that has one.
+fn for_each_file(
+    document: &xml::Document<'_>,
+    beside: Beside<'_>,
+    memory: &MemoryLimit,
+    read: ReadFile<'_>,
+) -> Result<Option<f64>, ReadError> {
+    if !document.kind.starts_with(IN_FILES) {
+        read(document)?;
+        return Ok(document.time());
+    }
+    read_listed(document, beside, memory, read)
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+fn read_listed(
+    document: &xml::Document<'_>,
+    beside: Beside<'_>,
+    memory: &MemoryLimit,
+    read: ReadFile<'_>,
+) -> Result<Option<f64>, ReadError> {
+    pvtu::for_each_file(document, beside, memory, read)
+}
+
+#[cfg(target_arch = "wasm32")]
+fn read_listed(
+    document: &xml::Document<'_>,
+    _: Beside<'_>,
+    _: &MemoryLimit,
+    _: ReadFile<'_>,
+) -> Result<Option<f64>, ReadError> {
+    Err(not_read(&document.kind)).at(String::new)
+}
+
+/// Reads the pieces that are listed, and their time.
+#[cfg(not(target_arch = "wasm32"))]
+fn read_pieces(
+    document: &xml::Document<'_>,
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<(TetMesh, Option<f64>), ReadError> {
+    pvtu::read(document, options, beside)
+}
+
+#[cfg(target_arch = "wasm32")]
+fn read_pieces(
+    document: &xml::Document<'_>,
+    _: &ReadOptions,
+    _: Beside<'_>,
+) -> Result<(TetMesh, Option<f64>), ReadError> {
+    Err(not_read(&document.kind)).at(String::new)
+}
+
+/// Why an XML file of this type is refused.
+fn not_read(kind: &str) -> ReadReason {
+    let (what, remedy) = match kind {
+        "PolyData" | "PPolyData" => {
+            return ReadReason::NoVolume("a data set of type PolyData".into());
+        }
+        "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
+        "PUnstructuredGrid" | "PImageData" | "PRectilinearGrid" | "PStructuredGrid" => {
+            ("a list of pieces".into(), "give one of the files that it lists")
+        }
+        other => (
+            format!("a data set of type {other}"),
+            "give an UnstructuredGrid, a StructuredGrid, a RectilinearGrid or ImageData",
+        ),
+    };
+    ReadReason::Unsupported { what, remedy: remedy.into() }
+}
+
+/// The name of a file before it was packed.
+fn without_gz(name: &str) -> &str {
+    let end = name.len().wrapping_sub(3);
+    match name.get(end..) {
+        Some(ending) if ending.eq_ignore_ascii_case(".gz") => &name[..end],
+        _ => name,
+    }
+}
+
+/// XML may have a byte order mark and white space in front of it.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start()
+}
+
+fn load<'a>(path: &Path, memory: &MemoryLimit) -> Result<FileBytes<'a>, ReadError> {
+    FilesOf::new(path, memory).load_one(path)
+}
+
+/// Names the file of an error that does not name another one.
+fn in_file(error: ReadError, name: &str) -> ReadError {
+    if error.file.is_empty() { ReadError { file: name.to_owned(), ..error } } else { error }
+}
+
+fn lower_extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+/// Positions from three coordinates each.
+fn points_from(coordinates: &[f64]) -> Vec<[f64; 3]> {
+    coordinates.as_chunks::<3>().0.to_vec()
+}

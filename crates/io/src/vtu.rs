@@ -1,0 +1,289 @@
+//! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces. What has vertices alone as cells is a mesh of
+//! points without tetrahedra.
+
+use crate::cells::{CellList, Numbering};
+use crate::error::{At, ReadError, ReadReason};
+use crate::fields::{Collector, check_finite, check_finite_cells};
+use crate::xml::{Array, Document, Piece};
+use crate::{CellData, ReadOptions, Survey, cells, points_from};
+use tetralod::mesh::{Field, MeshInput, TetMesh};
+
+/// Reads a document of type `UnstructuredGrid`. The points of different pieces stay different points.
+pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let mut mesh = TetMesh::default();
+    for (i, (number, piece)) in document.full_pieces().enumerate() {
+        let first = mesh.positions.len();
+        let part = PieceReader { document, piece, number, options }.read(&mut |points| {
+            Ok(Numbering::From { first: first_number(first, points.len())?, points: points.len() })
+        })?;
+        join(&mut mesh, part, i == 0).at(|| format!("piece {number}, <PointData>"))?;
+    }
+    Ok(mesh)
+}
+
+/// The number of the first of so many points behind others.
+pub(super) fn first_number(first: usize, points: usize) -> Result<u32, ReadReason> {
+    let end = first.checked_add(points).and_then(|end| u32::try_from(end).ok());
+    let too_large = || ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) };
+    end.map(|_| first as u32).ok_or_else(too_large)
+}
+
+/// Says what a document of type `UnstructuredGrid` contains; of its arrays only the types of cells are decoded.
+pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
+    let (mut points, mut cells) = (0_u64, 0_u64);
+    let options = &ReadOptions::default();
+    for (number, piece) in document.full_pieces() {
+        let reader = PieceReader { document, piece, number, options };
+        let count = piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
+        points = points.saturating_add(count as u64);
+        cells = cells.saturating_add(reader.most_tets()?);
+    }
+    let [fields, cell_fields] = names(document)?;
+    Ok(Survey { format: "vtu", points, cells, grid: None, fields, cell_fields })
+}
+
+/// The fields at points and at cells of the first piece, without values.
+pub(super) fn names(document: &Document<'_>) -> Result<[Vec<Field>; 2], ReadError> {
+    let Some((number, piece)) = document.full_pieces().next() else { return Ok([Vec::new(), Vec::new()]) };
+    let options = &ReadOptions::default();
+    let reader = PieceReader { document, piece, number, options };
+    Ok([reader.field_names("PointData")?, reader.field_names("CellData")?])
+}
+
+/// Reads what is wanted of one piece.
+pub(super) struct PieceReader<'a, 'd> {
+    pub document: &'a Document<'d>,
+    pub piece: &'a Piece<'d>,
+    pub number: usize,
+    pub options: &'a ReadOptions,
+}
+
+/// Numbers the points of a piece, given their positions.
+pub(super) type NumberPoints<'a> = &'a mut dyn FnMut(&[[f64; 3]]) -> Result<Numbering, ReadReason>;
+
+impl PieceReader<'_, '_> {
+    /// How to call the piece in an error.
+    pub fn place(&self) -> String {
+        format!("piece {}", self.number)
+    }
+
+    /// An unstructured grid. Its points are numbered as `numbers` says, which gets their positions.
+    pub fn read(&self, numbers: NumberPoints<'_>) -> Result<TetMesh, ReadError> {
+        let place = || self.place();
+        let points = self.piece.attributes.count("NumberOfPoints").at(place)?;
+        let cells = self.piece.attributes.count("NumberOfCells").at(place)?;
+        let mut listed = self.cells(cells)?;
+        if let (Some(listed), Some(ghosts)) = (&mut listed, self.ghosts("PointData", points)?) {
+            listed.hide(&ghosts.iter().map(|flags| flags & HIDDEN_POINT != 0).collect::<Vec<_>>());
+        }
+        let positions = self.points(points)?;
+        let [fields, other_fields] = self.fields("PointData", points)?;
+        let used = || listed.as_ref().map(|listed| listed.used(points));
+        check_finite(&positions, &fields, &used).at(place)?;
+        // Where all cells were left out, so is what is known of them.
+        let [mut cell_fields, other_cell_fields] = match &listed {
+            None => Default::default(),
+            Some(listed) => {
+                let at_cells = self.cell_fields(cells, &fields)?;
+                check_finite_cells(&at_cells[0], |cell| {
+                    listed.types.get(cell).is_some_and(|kind| !cells::is_flat(*kind))
+                })
+                .at(place)?;
+                at_cells
+            }
+        };
+        let numbering = numbers(&positions).at(place)?;
+        let split = listed.map(|listed| listed.split(&numbering, &self.options.memory)).transpose();
+        let split = split.at(|| format!("{}, <Cells>, array \"connectivity\"", place()))?.unwrap_or_default();
+        split.spread(&mut cell_fields);
+        let mut input = MeshInput { other_fields, other_cell_fields, ..split.input };
+        self.document.part_name(self.number).into_iter().for_each(|name| input.cells.name_part(name));
+        Ok(TetMesh { positions, fields, tets: split.tets, cell_fields, input, ..TetMesh::default() })
+    }
+
+    /// The fields in a section, each of `tuples` values, and the names of those that are not asked for.
+    pub fn fields(&self, section: &str, tuples: usize) -> Result<[Vec<Field>; 2], ReadError> {
+        self.collect(Collector::new(self.options), section, tuples)
+    }
+
+    fn collect(
+        &self,
+        mut collector: Collector<'_>,
+        section: &str,
+        tuples: usize,
+    ) -> Result<[Vec<Field>; 2], ReadError> {
+        for array in self.piece.section(section).filter(|array| is_field(array)) {
+            let Some(number) = array.number_type() else { continue };
+            let components = array.components().at(|| array.place())?;
+            let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? else {
+                continue;
+            };
+            self.expect_numbers(tuples.saturating_mul(components)).at(|| array.place())?;
+            let values = self.document.floats(array, tuples, components).at(|| array.place())?;
+            collector.fill(claim, values, number.is_integer(), array.unit()).at(|| array.place())?;
+        }
+        Ok([collector.fields, collector.others])
+    }
+
+    /// The fields at cells, beside these at points, as far as the options ask for them.
+    pub fn cell_fields(&self, cells: usize, fields: &[Field]) -> Result<[Vec<Field>; 2], ReadError> {
+        match self.options.cells {
+            CellData::LeaveOut => Ok([Vec::new(), Vec::new()]),
+            CellData::Names => Ok([self.field_names("CellData")?, Vec::new()]),
+            CellData::Values => self.collect(Collector::at_cells(self.options, fields), "CellData", cells),
+        }
+    }
+
+    /// The fields in a section without their values.
+    pub fn field_names(&self, section: &str) -> Result<Vec<Field>, ReadError> {
+        let mut collector = Collector::of_names();
+        for array in self.piece.section(section).filter(|array| is_field(array)) {
+            let components = array.components().at(|| array.place())?;
+            if let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? {
+                collector.keep_names(claim, array.unit());
+            }
+        }
+        Ok(collector.fields)
+    }
+
+    pub fn points(&self, points: usize) -> Result<Vec<[f64; 3]>, ReadError> {
+        let Some(array) = self.piece.section("Points").next() else {
+            if points == 0 {
+                return Ok(Vec::new());
+            }
+            return Err(ReadReason::Missing("the array of <Points>".into())).at(|| self.place());
+        };
+        let components = array.components().at(|| array.place())?;
+        if components != 3 {
+            let (what, found) = ("components of the points".into(), components as u64);
+            return Err(ReadReason::Count { what, expected: 3, found }).at(|| array.place());
+        }
+        self.options.memory.take((points as u64).saturating_mul(24)).at(|| array.place())?;
+        self.expect_numbers(points.saturating_mul(3)).at(|| array.place())?;
+        let values = self.document.floats(array, points, 3).at(|| array.place())?;
+        Ok(points_from(&values))
+    }
+
+    /// The cells; none if the piece has points alone.
+    fn cells(&self, cells: usize) -> Result<Option<CellList>, ReadError> {
+        if cells == 0 {
+            return Ok(Some(CellList::default()));
+        }
+        let find = |name: &str| -> Result<&Array<'_>, ReadError> {
+            let found = self.piece.section("Cells").find(|a| a.name() == name);
+            let missing = || ReadReason::Missing(format!("array \"{name}\" of <Cells>"));
+            found.ok_or_else(missing).at(|| self.place())
+        };
+        let types = find("types")?;
+        // Types and ends.
+        self.expect_numbers(cells.saturating_mul(2)).at(|| types.place())?;
+        let mut kinds = self.document.integers(types, cells).at(|| types.place())?;
+        if cells::are_points(&kinds) {
+            return Ok(None);
+        }
+        cells::most_tets(&kinds).at(|| types.place())?;
+        let offsets = find("offsets")?;
+        let ends = self.document.integers(offsets, cells).at(|| offsets.place())?;
+        let is_old = self.document.is_before([2, 1]);
+        let swapped = is_old.then(|| kinds.iter().map(|kind| *kind == cells::LAGRANGE_HEXAHEDRON).collect());
+        cells::resolve_orders(&mut kinds, &ends);
+        cells::most_tets(&kinds).at(|| types.place())?;
+        let length = cells::checked_ends(&kinds, &ends).at(|| offsets.place())?;
+        let connectivity = find("connectivity")?;
+        self.expect_numbers(length).at(|| connectivity.place())?;
+        let list = self.document.integers(connectivity, length).at(|| connectivity.place())?;
+        let mut list = CellList { types: kinds, ends, connectivity: list };
+        if let Some(swapped) = swapped {
+            list.order_as_before_9(swapped);
+        }
+        if let Some(ghosts) = self.ghosts("CellData", cells)? {
+            list.leave_out(&ghosts);
+        }
+        Ok(Some(list))
+    }
+
+    /// Checks that there is room for so many numbers, unpacked and decoded, which are at most eight bytes each.
+    fn expect_numbers(&self, count: usize) -> Result<(), ReadReason> {
+        self.options.memory.expect((count as u64).saturating_mul(16))
+    }
+
+    /// The tetrahedra at most that the cells become.
+    pub fn most_tets(&self) -> Result<u64, ReadError> {
+        let cells = self.piece.attributes.count("NumberOfCells").at(|| self.place())?;
+        let Some(types) = self.piece.section("Cells").find(|a| a.name() == "types").filter(|_| cells > 0)
+        else {
+            return Ok(0);
+        };
+        let mut kinds = self.document.integers(types, cells).at(|| types.place())?;
+        if cells::depend_on_points(&kinds)
+            && let Some(offsets) = self.piece.section("Cells").find(|a| a.name() == "offsets")
+        {
+            cells::resolve_orders(
+                &mut kinds,
+                &self.document.integers(offsets, cells).at(|| offsets.place())?,
+            );
+        }
+        if cells::are_points(&kinds) { Ok(0) } else { cells::most_tets(&kinds).at(|| types.place()) }
+    }
+
+    /// The flags by which VTK marks points or cells that are hidden, or another piece's, if there are any.
+    pub fn ghosts(&self, section: &str, tuples: usize) -> Result<Option<Vec<i64>>, ReadError> {
+        for array in self.piece.section(section) {
+            let to_flags: fn(i64) -> i64 = match array.name() {
+                GHOST_TYPE => |flags| flags,
+                // Old files say how far a cell is from the piece.
+                GHOST_LEVELS => |levels| i64::from(levels != 0),
+                _ => continue,
+            };
+            let flags = self.document.integers(array, tuples).at(|| array.place())?;
+            return Ok(Some(flags.into_iter().map(to_flags).collect()));
+        }
+        Ok(None)
+    }
+}
+
+/// Arrays at cells and points by which VTK marks what belongs to another piece, or is hidden: flags of each, and how far it is
+/// from the piece in old files.
+pub(super) const GHOST_TYPE: &str = "vtkGhostType";
+pub(super) const GHOST_LEVELS: &str = "vtkGhostLevels";
+/// The flags of cells that another piece has, and of those that are hidden or that finer ones take the place of.
+pub(super) const GHOST_CELL: i64 = 1;
+pub(super) const HIDDEN_CELL: i64 = 32 | 8;
+/// The flag of points that are hidden; so are the cells there.
+pub(super) const HIDDEN_POINT: i64 = 2;
+
+/// Whether an array is a field, not a mark of VTK's.
+fn is_field(array: &Array<'_>) -> bool {
+    array.number_type().is_some() && ![GHOST_TYPE, GHOST_LEVELS].contains(&array.name())
+}
+
+/// Appends a piece, which must have the fields of those before it.
+pub(super) fn join(mesh: &mut TetMesh, part: TetMesh, is_first: bool) -> Result<(), ReadReason> {
+    if is_first {
+        *mesh = part;
+        return Ok(());
+    }
+    join_fields(&mut mesh.fields, &part.fields)?;
+    join_fields(&mut mesh.cell_fields, &part.cell_fields)?;
+    mesh.input.append(part.input);
+    mesh.positions.extend(part.positions);
+    mesh.tets.extend(part.tets);
+    Ok(())
+}
+
+fn join_fields(fields: &mut [Field], more: &[Field]) -> Result<(), ReadReason> {
+    if let Some(extra) = more.iter().find(|f| !fields.iter().any(|g| g.name == f.name)) {
+        return Err(ReadReason::Missing(format!(
+            "array \"{}\", which this piece has, in an earlier piece",
+            extra.name
+        )));
+    }
+    for Field { name, values, integer, .. } in fields {
+        let same = more.iter().find(|f| f.name == *name);
+        let same =
+            same.ok_or_else(|| ReadReason::Missing(format!("array \"{name}\", which earlier pieces have,")))?;
+        values.extend_from_slice(&same.values);
+        *integer &= same.integer;
+    }
+    Ok(())
+}

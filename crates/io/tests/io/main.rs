@@ -1,0 +1,21 @@
+//! Promises of the exchange formats.
+
+mod cells;
+mod curved;
+mod damaged;
+#[path = "../../../../tests/support/data.rs"]
+mod data;
+mod encodings;
+mod fields;
+mod files;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+mod memory;
+#[cfg(not(target_arch = "wasm32"))]
+mod meshers;
+mod odd;
+#[cfg(not(target_arch = "wasm32"))]
+mod pieces;
+mod real;
+mod surfaces;
+mod survey;

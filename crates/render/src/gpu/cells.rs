@@ -1,0 +1,151 @@
+//! Draws tetrahedra as they are, or the points of the mesh.
+
+use crate::gpu::buffers::GrowBuffer;
+use crate::gpu::cell_parts::{edges, outer_faces};
+use crate::gpu::mesh::MeshBuffers;
+use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
+use crate::gpu::style::{CellShape, CellStyle, StyleUniform};
+use crate::gpu::{Context, GpuError};
+use tetralod::geom::{SinglePoints, SingleValues};
+use tetralod::view::MeshView;
+
+#[derive(Debug)]
+pub(super) struct CellPass {
+    solid: wgpu::RenderPipeline,
+    faces: wgpu::RenderPipeline,
+    wire: wgpu::RenderPipeline,
+    point: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+    uniform: wgpu::Buffer,
+    style: CellStyle,
+    /// How the points and values of the mesh are stored, and the values of tetrahedra.
+    stored: (SinglePoints, SingleValues),
+    own_stored: SingleValues,
+    values: GrowBuffer<f32>,
+    /// The outer faces of solid tetrahedra, or the edges.
+    parts: GrowBuffer<u32>,
+    /// Whether these are the ones of the mesh and the style.
+    has_parts: bool,
+}
+
+impl CellPass {
+    pub(super) fn new(context: &Context, common: &Common) -> Self {
+        use Binding::{Uniform, Vertices};
+        let layout = group_layout(context, "cells", &[Uniform, Vertices, Vertices, Vertices, Vertices]);
+        let groups = [Some(&layout)];
+        let pipeline = |vertex, fragment, only_front| {
+            let output = Output::Opaque { only_front };
+            let spec =
+                PipelineSpec { shader: "cells", vertex, fragment, buffers: &[], groups: &groups, output };
+            spec.create(context, common)
+        };
+        Self {
+            solid: pipeline("vs", "fs", true),
+            faces: pipeline("vs_face", "fs", true),
+            wire: pipeline("vs_edge", "fs_edge", false),
+            point: pipeline("vs_point", "fs_point", false),
+            layout,
+            uniform: uniform::<StyleUniform>(context, "style of cells"),
+            style: CellStyle::default(),
+            stored: Default::default(),
+            own_stored: SingleValues::PLAIN,
+            values: GrowBuffer::new("values of tetrahedra", wgpu::BufferUsages::STORAGE),
+            parts: GrowBuffer::new("faces or edges of tetrahedra", wgpu::BufferUsages::STORAGE),
+            has_parts: false,
+        }
+    }
+
+    pub(super) fn set_style(&mut self, context: &Context, style: &CellStyle) {
+        let is_wire = |style: &CellStyle| style.shape == CellShape::Wire;
+        self.has_parts &= style.cut == self.style.cut && is_wire(style) == is_wire(&self.style);
+        self.style = *style;
+        self.write_style(context);
+    }
+
+    /// How the points and values of the mesh are stored.
+    pub(super) fn set_stored(&mut self, context: &Context, points: SinglePoints, values: SingleValues) {
+        self.stored = (points, values);
+        self.write_style(context);
+    }
+
+    pub(super) fn set_values(&mut self, context: &Context, values: &[f64]) -> Result<(), GpuError> {
+        self.own_stored = SingleValues::of_values(values);
+        self.write_style(context);
+        self.values.write(context, &self.own_stored.store_all(values))
+    }
+
+    fn write_style(&self, context: &Context) {
+        let (points, values) = &self.stored;
+        let values = if self.style.own_values { &self.own_stored } else { values };
+        let uniform = StyleUniform::of_cells(&self.style, points, values);
+        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
+    }
+
+    /// Whether it lacks what the style shows of the mesh.
+    pub(super) fn is_behind(&self) -> bool {
+        !self.has_parts && !matches!(self.style.shape, CellShape::Points(_))
+    }
+
+    /// Finds what the style shows of the mesh.
+    pub(super) fn update(&mut self, context: &Context, mesh: &MeshView<'_>) -> Result<(), GpuError> {
+        let parts = match self.style.shape {
+            CellShape::Wire => edges(mesh, &self.style.cut),
+            CellShape::Solid(_) => outer_faces(mesh, &self.style.cut),
+            CellShape::Points(_) => Vec::new(),
+        };
+        self.has_parts = false;
+        self.parts.write(context, &parts)?;
+        self.has_parts = true;
+        Ok(())
+    }
+
+    /// Bytes of memory on the GPU.
+    pub(super) fn bytes(&self) -> u64 {
+        self.values.bytes() + self.parts.bytes()
+    }
+
+    /// `has_clips`: whether clip planes cut anything.
+    pub(super) fn draw(
+        &self,
+        context: &Context,
+        mesh: &MeshBuffers,
+        has_clips: bool,
+        pass: &mut wgpu::RenderPass<'_>,
+    ) {
+        let (Some(points), Some(tets)) = (mesh.points.binding(), mesh.corners.buffer.binding()) else {
+            return;
+        };
+        // Values of another mesh would be wrong; points stand in for values that nobody reads.
+        let has_values = self.values.len() == mesh.corners.buffer.len();
+        if self.style.own_values && !has_values {
+            return;
+        }
+        let values = self.values.binding().unwrap_or_else(|| points.clone());
+        let parts = self.parts.binding().unwrap_or_else(|| points.clone());
+        let uniform = self.uniform.as_entire_binding();
+        pass.set_bind_group(1, &group(context, &self.layout, &[uniform, points, tets, values, parts]), &[]);
+        let parts = if self.has_parts { self.parts.len() as u32 } else { 0 };
+        // Shrunk ones and those that clip planes cut open show faces that others hide.
+        let is_whole =
+            self.style.shape == CellShape::Solid(0.0) && !(has_clips && self.style.style.clips != 0);
+        let corners = 12 * mesh.corners.buffer.len() as u32;
+        match self.style.shape {
+            CellShape::Solid(_) if is_whole => {
+                pass.set_pipeline(&self.faces);
+                pass.draw(0..3 * parts, 0..1);
+            }
+            CellShape::Solid(_) => {
+                pass.set_pipeline(&self.solid);
+                pass.draw(0..corners, 0..1);
+            }
+            CellShape::Wire => {
+                pass.set_pipeline(&self.wire);
+                pass.draw(0..2 * parts, 0..1);
+            }
+            CellShape::Points(_) => {
+                pass.set_pipeline(&self.point);
+                pass.draw(0..6, 0..mesh.points.len() as u32);
+            }
+        }
+    }
+}

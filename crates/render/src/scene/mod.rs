@@ -1,0 +1,437 @@
+//! A scene: what is shown of a session's mesh, kept up to date with it, and drawn by the [renderer](crate::gpu).
+//!
+//! [`SceneState`] says what is shown, as plain data. [`Scene::update`] computes what is out of date, and hands the renderer what has
+//! changed; nothing is computed that is not shown.
+
+mod kept;
+mod objects;
+mod pick;
+mod state;
+mod styles;
+
+pub use state::{
+    ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourState, CompareState,
+    IsosurfaceState, MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
+};
+
+use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer, SideTarget, TextureView};
+use glam::DVec3;
+use kept::Kept;
+use objects::{Objects, Shown};
+use styles::{quantity, scale};
+use tetralod::Coded;
+use tetralod::geom::{Bounds, Camera, Ray, SinglePoints};
+use tetralod::session::{Session, SessionError};
+use tetralod::view::{ClipPlane, ColourScale, Probe, ScaleError};
+use thiserror::Error;
+
+/// The outline of the domain, on a dark and on a light background.
+const OUTLINE: [[f32; 4]; 2] = [[0.85, 0.9, 1.0, 0.35], [0.25, 0.28, 0.33, 0.6]];
+const REGION: [f32; 4] = [0.36, 0.86, 1.0, 1.0];
+
+/// Why a scene cannot be shown.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The GPU cannot draw it.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The session cannot give what it shows.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The colours have no range.
+    #[error("option `colours`: {0}")]
+    Scale(#[from] ScaleError),
+    /// Something that the state names is not possible.
+    #[error("option `{what}`: {problem}")]
+    State {
+        /// Which part of the state.
+        what: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+}
+
+impl Coded for SceneError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Gpu(error) => error.code(),
+            Self::Session(error) => error.code(),
+            Self::State { .. } | Self::Scale(_) => "bad-option",
+        }
+    }
+}
+
+impl SceneError {
+    fn state(what: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::State { what: what.into(), problem: problem.into() }
+    }
+}
+
+/// What the colours of a picture mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Legend {
+    /// The name of the field or the quantity.
+    pub label: String,
+    /// The colours of its values.
+    pub scale: ColourScale,
+}
+
+/// What is shown of a session's mesh.
+#[derive(Debug)]
+pub struct Scene {
+    renderer: Renderer,
+    state: SceneState,
+    objects: Objects,
+    kept: Option<Kept>,
+    /// The box around the reference mesh, once it is known.
+    bounds: Option<Bounds>,
+    look: Look,
+    /// Whether the state has changed since the last update.
+    is_stale: bool,
+}
+
+impl Scene {
+    /// A scene that `renderer` draws.
+    pub fn new(renderer: Renderer) -> Self {
+        Self {
+            renderer,
+            state: SceneState::default(),
+            objects: Objects::default(),
+            kept: None,
+            bounds: None,
+            look: Look::default(),
+            is_stale: true,
+        }
+    }
+
+    /// Draws with another renderer, as when the device of the one before is lost. All is computed and uploaded
+    /// again.
+    pub fn set_renderer(&mut self, renderer: Renderer) {
+        self.renderer = renderer;
+        self.objects = Objects::default();
+        if let Some(kept) = &mut self.kept {
+            kept.objects = Objects::default();
+        }
+        self.is_stale = true;
+    }
+
+    /// Keeps a copy of the mesh as it is, with all of its fields, to be compared with later ones: see
+    /// [`SceneState::compare`]. It takes the place of one that was kept before.
+    ///
+    /// # Errors
+    /// If nothing has arrived yet.
+    pub fn keep(&mut self, session: &mut Session) -> Result<(), SceneError> {
+        self.renderer.set_split(0.0);
+        self.kept = Some(Kept::of(session)?);
+        self.is_stale = true;
+        Ok(())
+    }
+
+    /// The renderer.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// The renderer, to resize it for example.
+    pub fn renderer_mut(&mut self) -> &mut Renderer {
+        &mut self.renderer
+    }
+
+    /// What is shown.
+    pub fn state(&self) -> &SceneState {
+        &self.state
+    }
+
+    /// Changes what is shown, from the next [`Scene::update`] on.
+    ///
+    /// # Errors
+    /// If a part of it makes no sense whatever the volume is; then nothing changes.
+    pub fn set_state(&mut self, state: SceneState) -> Result<(), SceneError> {
+        check(&state)?;
+        self.state = state;
+        self.is_stale = true;
+        Ok(())
+    }
+
+    /// Pixels of the target per unit of the page's layout.
+    pub fn set_pixel_ratio(&mut self, ratio: f32) {
+        self.look.pixel_ratio = if ratio.is_finite() { ratio.clamp(0.25, 8.0) } else { 1.0 };
+    }
+
+    /// Another session comes: forgets the mesh of the last one. The state stays.
+    pub fn forget(&mut self) -> Result<(), SceneError> {
+        self.bounds = None;
+        self.is_stale = true;
+        self.kept = None;
+        self.renderer.set_split(0.0);
+        self.objects.clear(&mut self.renderer)?;
+        Ok(())
+    }
+
+    /// The box around the reference mesh, which all meshes are in; none until the base mesh is there.
+    pub fn bounds(&self) -> Option<&Bounds> {
+        self.bounds.as_ref()
+    }
+
+    /// What the colours mean, if anything is coloured by values.
+    pub fn legend(&self) -> Option<&Legend> {
+        self.objects.legend()
+    }
+
+    /// Triangles of all surfaces that are drawn.
+    pub fn triangles(&self) -> usize {
+        self.renderer.triangles()
+    }
+
+    /// Looks up the box around the session's mesh if that is there for the first time; whether it is. [`Scene::update`] does so, too.
+    pub fn meet(&mut self, session: &mut Session) -> bool {
+        if self.bounds.is_some() || session.info().is_none() {
+            return false;
+        }
+        self.bounds = session.bounds();
+        self.is_stale = true;
+        true
+    }
+
+    /// Brings what is shown up to date with the session's mesh; whether anything has changed, so that a new picture is due.
+    ///
+    /// # Errors
+    /// If the state names what the volume does not have, or it does not fit on the GPU; what fits is shown.
+    pub fn update(&mut self, session: &mut Session) -> Result<bool, SceneError> {
+        if session.info().is_none() {
+            return Ok(std::mem::take(&mut self.is_stale));
+        }
+        self.meet(session);
+        let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
+        let is_stale = std::mem::take(&mut self.is_stale);
+        if is_stale {
+            // Before anything is stored. The values are those of a field, which the objects know.
+            let points = session.info().map_or(SinglePoints::PLAIN, |info| info.single_points());
+            self.renderer.set_points(points);
+            self.look = Look { pixel_ratio: self.look.pixel_ratio, ..look(&self.state, &bounds) };
+            self.renderer.set_boxes(&boxes(&self.state, &bounds))?;
+        }
+        let other =
+            self.kept.as_ref().filter(|_| self.state.compare.is_some_and(|compare| compare.difference));
+        let shown = Shown {
+            state: &self.state,
+            bounds: &bounds,
+            other: other.map(|kept| kept.view(session.field())),
+        };
+        let changed = self.objects.update(&mut self.renderer, session, &shown, is_stale)?;
+        if is_stale {
+            self.update_kept(session, &bounds)?;
+        }
+        Ok(changed || is_stale)
+    }
+
+    /// Shows the mesh that was kept beside the current one, if it is to be shown.
+    fn update_kept(&mut self, session: &Session, bounds: &Bounds) -> Result<(), SceneError> {
+        let at = self.state.compare.map_or(0.0, |compare| compare.at);
+        let (Some(kept), Some(info), true) = (&mut self.kept, session.info(), at > 0.0) else {
+            self.renderer.set_split(0.0);
+            return Ok(());
+        };
+        self.renderer.set_split(at);
+        let other = self.renderer.beside()?;
+        other.set_points(info.single_points());
+        other.set_boxes(&boxes(&self.state, bounds))?;
+        kept.update(other, info, session.field(), &self.state, bounds)
+    }
+
+    /// Draws a picture; `false` when the target is not available, such as a hidden canvas.
+    ///
+    /// # Errors
+    /// If the device is lost or refused something.
+    pub fn draw(&mut self, session: &mut Session, camera: &Camera) -> Result<bool, SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.draw(camera, &self.look)?)
+    }
+
+    /// Draws a picture into a view of a texture, as [`Renderer::render`] does.
+    ///
+    /// # Errors
+    /// As [`Scene::draw`].
+    pub fn render(
+        &mut self,
+        view: &TextureView,
+        session: &mut Session,
+        camera: &Camera,
+    ) -> Result<(), SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.render(view, camera, &self.look)?)
+    }
+
+    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture_with`] does.
+    ///
+    /// # Errors
+    /// If the target is no image, or the device is lost or refused something.
+    pub async fn picture(
+        &mut self,
+        session: &mut Session,
+        camera: &Camera,
+        samples: u32,
+        drawn: impl FnMut(u32),
+    ) -> Result<Vec<u8>, SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.picture_with(camera, &self.look, samples, drawn).await?)
+    }
+
+    /// Draws a picture on another target, as the mean of `samples`, with lines as wide in its parts as they are on the own one.
+    ///
+    /// # Errors
+    /// As [`Scene::draw`].
+    pub fn draw_on(
+        &mut self,
+        target: &mut SideTarget,
+        session: &mut Session,
+        camera: &Camera,
+        samples: u32,
+    ) -> Result<(), SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.draw_on_side(target, camera, &self.look, samples)?)
+    }
+
+    /// Draws the last picture again, for a smoother mean of several: see [`Renderer::draw_again`].
+    ///
+    /// # Errors
+    /// As [`Scene::draw`].
+    pub fn draw_again(&mut self) -> Result<bool, SceneError> {
+        Ok(self.renderer.draw_again()?)
+    }
+
+    /// The nearest point that is shown along a ray: of an isosurface, a slice, the boundary, a tetrahedron, a streamline, an
+    /// arrow, or of the volume where half of the light is lost; none if there is none.
+    pub fn pick(&self, session: &mut Session, ray: &Ray) -> Option<[f64; 3]> {
+        self.objects.pick(session, &self.state, &self.look.clips, ray, self.bounds.as_ref()?)
+    }
+
+    /// Tells the renderer in which tetrahedron the eye is.
+    fn place_eye(&mut self, session: &mut Session, camera: &Camera) {
+        let (Some(_), Some(bounds)) = (&self.state.volume, &self.bounds) else { return };
+        let eye = camera.rays(1.0).origin[0];
+        let mesh = session.view();
+        let is_near = eye.cmpge(DVec3::from(bounds.min)).all() && eye.cmple(DVec3::from(bounds.max)).all();
+        let place = is_near.then(|| Probe::new(mesh).locate(eye.into())).flatten();
+        self.renderer.set_eye(&mesh, place.as_ref());
+    }
+}
+
+/// What makes no sense whatever the volume is.
+fn check(state: &SceneState) -> Result<(), SceneError> {
+    let clips = state.clips.iter().enumerate().map(|(i, clip)| (format!("clips[{i}]"), *clip));
+    let slices = state.slices.iter().enumerate().map(|(i, slice)| (format!("slices[{i}]"), slice.plane()));
+    let cut = state.cells.as_ref().and_then(|cells| cells.cut).map(|cut| ("cells.cut".to_owned(), cut));
+    if let Some((what, plane)) = clips.chain(slices).chain(cut).find(|(_, plane)| !plane.is_plane()) {
+        let PlaneState { normal, offset } = plane;
+        let problem = format!(
+            "must have a `normal` of three numbers, not all 0, and an `offset`; given: {normal:?}, {offset}"
+        );
+        return Err(SceneError::state(what, problem));
+    }
+    for (what, corners) in [("clipBox", &state.clip_box), ("region", &state.region)] {
+        if corners.as_ref().is_some_and(|corners| state::bounds(corners).is_none()) {
+            let problem =
+                "must be six numbers, x0, y0, z0, x1, y1, z1, each of the first at most that of the last";
+            return Err(SceneError::state(what, problem));
+        }
+    }
+    if state.compare.is_some_and(|compare| !(0.0..=1.0).contains(&compare.at)) {
+        return Err(SceneError::state("compare.at", "must be a fraction of the width, 0 to 1"));
+    }
+    let planes = state.clips.len() + if state.clip_box.is_some() { 6 } else { 0 };
+    if planes > MOST_CLIPS {
+        let problem =
+            format!("at most {MOST_CLIPS} planes can cut, of which a box takes six; given: {planes}");
+        return Err(SceneError::state("clips", problem));
+    }
+    if state.isosurfaces.iter().any(|surface| surface.value.is_some_and(|value| !value.is_finite())) {
+        return Err(SceneError::state("isosurfaces", "values must be finite numbers"));
+    }
+    if let Some(cells) = &state.cells {
+        quantity(cells)?;
+    }
+    if let Some(range) = state.colours.range {
+        scale(&state.colours, Some(range), range)?;
+    }
+    check_numbers(state)?;
+    check_volume(state)
+}
+
+/// Numbers that are to be drawn with: finite, and lengths positive.
+fn check_numbers(state: &SceneState) -> Result<(), SceneError> {
+    let (tubes, arrows) = (state.streamlines.as_ref(), state.arrows.as_ref());
+    let lengths = [
+        ("streamlines.radius", tubes.and_then(|tubes| tubes.radius)),
+        ("arrows.spacing", arrows.and_then(|arrows| arrows.spacing)),
+        ("volume.unitLength", state.volume.as_ref().and_then(|volume| volume.unit_length)),
+    ];
+    let is_length = |length: f64| length.is_finite() && length > 0.0;
+    if let Some((what, _)) =
+        lengths.iter().find(|(_, length)| length.is_some_and(|length| !is_length(length)))
+    {
+        return Err(SceneError::state(*what, "must be a positive number"));
+    }
+    if tubes.is_some_and(|tubes| tubes.seeds.as_flattened().iter().any(|x| !x.is_finite())) {
+        return Err(SceneError::state("streamlines.seeds", "must be points of three finite numbers"));
+    }
+    let cells =
+        state.cells.as_ref().map(|cells| [("cells.shrink", cells.shrink), ("cells.width", cells.width)]);
+    let opacities = state.isosurfaces.iter().map(|surface| ("isosurfaces", surface.opacity));
+    let opacities = opacities.chain(state.slices.iter().map(|slice| ("slices", slice.opacity)));
+    let opacities = opacities.chain(state.boundary.as_ref().map(|boundary| ("boundary", boundary.opacity)));
+    let mut numbers = opacities.chain(cells.into_iter().flatten()).chain([("shade", state.shade)]);
+    match numbers.find(|(_, number)| !number.is_finite()) {
+        Some((what, number)) => {
+            Err(SceneError::state(what, format!("must be a finite number, not {number}")))
+        }
+        None => Ok(()),
+    }
+}
+
+fn check_volume(state: &SceneState) -> Result<(), SceneError> {
+    let Some(volume) = &state.volume else { return Ok(()) };
+    let values: Vec<f64> =
+        volume.opacities.iter().map(|p| p[0]).chain(volume.points.iter().map(|p| p[0])).collect();
+    let of_points = volume.points.iter().flatten().chain(volume.opacities.iter().flatten());
+    if !of_points.into_iter().all(|x| x.is_finite()) {
+        return Err(SceneError::state("volume", "values and opacities must be finite numbers"));
+    }
+    if !values.is_sorted() || !volume.opacities.is_empty() && !volume.points.is_empty() {
+        let problem = "give `opacities` or `points`, not both, with ascending values";
+        return Err(SceneError::state("volume", problem));
+    }
+    Ok(())
+}
+
+/// All clip planes: those of the state, then the faces of its box.
+fn clips(state: &SceneState) -> Vec<ClipPlane> {
+    let mut clips: Vec<ClipPlane> = state.clips.iter().map(PlaneState::clip).collect();
+    if let Some(bounds) = state.clip_box.as_ref().and_then(state::bounds) {
+        for axis in 0..3 {
+            let normal = |sign: f64| [0, 1, 2].map(|i| if i == axis { sign } else { 0.0 });
+            clips.push(ClipPlane { normal: normal(1.0), offset: bounds.max[axis] });
+            clips.push(ClipPlane { normal: normal(-1.0), offset: -bounds.min[axis] });
+        }
+    }
+    clips
+}
+
+fn look(state: &SceneState, bounds: &Bounds) -> Look {
+    let (sky, ground) = match state.background {
+        Background::Dark => (Look::default().sky, Look::default().ground),
+        Background::Light => ([0.985, 0.985, 0.99, 1.0], [0.93, 0.935, 0.945, 1.0]),
+        Background::Transparent => ([0.0; 4], [0.0; 4]),
+    };
+    let shade = [state.shade.clamp(0.0, 1.0) as f32, (0.05 * bounds.diagonal()) as f32];
+    Look { sky, ground, clips: clips(state), shade, ..Look::default() }
+}
+
+fn boxes(state: &SceneState, bounds: &Bounds) -> Vec<BoxLines> {
+    let colour = OUTLINE[usize::from(state.background != Background::Dark)];
+    let outline = BoxLines { bounds: *bounds, colour, width: 1.0, handles: false };
+    let region = state.region.as_ref().and_then(state::bounds);
+    let region = region.map(|bounds| BoxLines { bounds, colour: REGION, width: 2.0, handles: true });
+    state.outline.then_some(outline).into_iter().chain(region).collect()
+}

@@ -1,0 +1,533 @@
+//! The class that builds MT files in a page: files of a mesh go in, the bytes of an MT file come out. All of it happens in one call
+//! on one thread, so JavaScript puts it into a worker of its own and ends that to stop the work.
+
+mod memory;
+mod options;
+
+use crate::memory::{Forecast, LARGEST_MEMORY};
+use crate::options::{BuildOptions, build_options};
+use js_sys::{Function, Object, Reflect, Uint8Array};
+use serde::Serialize;
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+use tetralod::Coded;
+use tetralod::format::{EncodeError, EncodeOptions, encode};
+use tetralod::geom::Bounds;
+use tetralod::mesh::{
+    self, Field, GeometryField, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh,
+};
+use tetralod_build::{self as builder, BuildConfig, BuildError, BuildProgress, BuildSummary, Remedy};
+use tetralod_io::{
+    self as io, CellData, FieldSelection, MemoryLimit, ReadError, ReadOptions, ReadReason, Survey,
+    TimeStepsError, read_time_steps,
+};
+use tetralod_web::error::WebError;
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast, JsValue};
+
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = include_str!("build.d.ts");
+
+#[wasm_bindgen]
+extern "C" {
+    /// What is in the files, as a plain object.
+    #[wasm_bindgen(typescript_type = "InputInfo")]
+    pub type JsInputInfo;
+    /// The MT file and what was done.
+    #[wasm_bindgen(typescript_type = "{ bytes: Uint8Array<ArrayBuffer>, report: CoreBuildReport }")]
+    pub type JsBuilt;
+    /// Options as JavaScript gives them: anything at all.
+    #[wasm_bindgen(typescript_type = "CoreBuildOptions | undefined")]
+    pub type JsBuildOptions;
+}
+
+thread_local! {
+    /// Hears of panics, which end as traps without a message.
+    static ON_PANIC: RefCell<Option<Function>> = RefCell::default();
+}
+
+/// The files of a mesh, and the MT that is built of them.
+#[wasm_bindgen]
+pub struct MeshBuilder {
+    files: Vec<InputFile>,
+    /// Bytes of memory that may be used.
+    memory: u64,
+}
+
+/// The file of a time step, or of the whole mesh.
+#[derive(Default)]
+struct InputFile {
+    name: String,
+    bytes: Vec<u8>,
+    sidecar: Option<(String, Vec<u8>)>,
+}
+
+impl InputFile {
+    fn survey(&self) -> Result<Survey, WebError> {
+        Ok(match &self.sidecar {
+            Some((name, sidecar)) => io::survey_raw(name, sidecar)?,
+            None => io::survey(&self.name, &self.bytes)?,
+        })
+    }
+
+    fn read(&self, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+        match &self.sidecar {
+            // What is wrong with the sidecar alone was found before.
+            Some((_, sidecar)) => io::read_raw(&self.name, sidecar, &self.bytes),
+            None => io::read_bytes_with(&self.name, &self.bytes, options),
+        }
+    }
+
+    fn size(&self) -> u64 {
+        io::held_bytes(&self.bytes) + self.sidecar.as_ref().map_or(0, |(_, bytes)| bytes.len() as u64)
+    }
+}
+
+#[wasm_bindgen]
+impl MeshBuilder {
+    /// Without files, and with so many bytes of memory at most; all that a wasm module can have if not given. `on_panic` hears the
+    /// message of a panic before it becomes a trap.
+    #[wasm_bindgen(constructor)]
+    pub fn new(on_panic: Function, memory: Option<f64>) -> Self {
+        ON_PANIC.set(Some(on_panic));
+        std::panic::set_hook(Box::new(|info| {
+            ON_PANIC.with_borrow(|hook| {
+                let message = JsValue::from_str(&info.to_string());
+                // Nothing can be done about an error of the hook.
+                hook.iter().for_each(|hook| _ = hook.call1(&JsValue::UNDEFINED, &message));
+            });
+        }));
+        let memory = memory.map_or(LARGEST_MEMORY, |bytes| (bytes.max(0.0) as u64).min(LARGEST_MEMORY));
+        Self { files: Vec::new(), memory }
+    }
+
+    /// Begins a file of so many bytes, which `append` brings. Each further file is a time step.
+    #[wasm_bindgen(js_name = addFile)]
+    pub fn add_file(&mut self, name: String, size: f64) -> Result<(), WebError> {
+        let held: u64 = self.files.iter().map(InputFile::size).sum();
+        let whole = held.saturating_add(size.max(0.0) as u64);
+        if whole > self.memory {
+            return Err(self.too_large(&name, whole));
+        }
+        let mut file = InputFile { name, ..InputFile::default() };
+        // The size fits: it is at most that of the memory, which is less than 2^32.
+        if file.bytes.try_reserve_exact(size.max(0.0) as usize).is_err() {
+            return Err(self.too_large(&file.name, whole));
+        }
+        self.files.push(file);
+        Ok(())
+    }
+
+    /// Appends bytes to the file that was begun last.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<(), WebError> {
+        let memory = self.memory;
+        let Some(file) = self.files.last_mut() else { return Err(no_file()) };
+        if file.bytes.try_reserve(bytes.len()).is_err() {
+            return Err(too_large(&file.name, file.size() + bytes.len() as u64, memory));
+        }
+        file.bytes.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    /// The JSON beside the raw samples that were begun last.
+    #[wasm_bindgen(js_name = addSidecar)]
+    pub fn add_sidecar(&mut self, name: String, bytes: &[u8]) -> Result<(), WebError> {
+        let Some(file) = self.files.last_mut() else { return Err(no_file()) };
+        file.sidecar = Some((name, bytes.to_vec()));
+        Ok(())
+    }
+
+    /// What is in the files, and whether it can be built with these options. The points are read for their bounds, if there is
+    /// enough memory.
+    pub fn inspect(&self, options: JsBuildOptions) -> Result<JsInputInfo, WebError> {
+        let options = build_options(&options)?;
+        let (first, survey) = self.first()?;
+        let forecast = self.forecast(&survey, &options);
+        let bounds = match &survey.grid {
+            Some(grid) => Some(Bounds::of(&[grid.point([0; 3]), grid.point(grid.dims.map(|d| d - 1))])),
+            None if forecast.reading > self.memory => None,
+            None => {
+                let options = ReadOptions { fields: Some(Vec::new()), ..ReadOptions::default() };
+                let points = first.read(&options)?.positions;
+                Some(Bounds::of(&points)).filter(|_| !points.is_empty())
+            }
+        };
+        Ok(info(&survey, bounds, forecast.peak(), self.memory))
+    }
+
+    /// Builds the MT file. `progress` gets the stage of the work, how much of it is done, the whole, and the tetrahedra that are left
+    /// where they change; if it returns `true`, the work stops. The files are gone then.
+    pub fn build(&mut self, options: JsBuildOptions, progress: &Function) -> Result<JsBuilt, WebError> {
+        let options = build_options(&options)?;
+        let (_, survey) = self.first()?;
+        Self::check_fields(&survey, &options)?;
+        let forecast = self.forecast(&survey, &options);
+        if forecast.peak() > self.memory {
+            return Err(no_memory(&survey, forecast.peak(), self.memory));
+        }
+        let stages = Stages { progress, stopped: false };
+        self.build_of(options, stages)
+    }
+}
+
+impl MeshBuilder {
+    fn first(&self) -> Result<(&InputFile, Survey), WebError> {
+        let first = self.files.first().ok_or_else(no_file)?;
+        Ok((first, first.survey()?))
+    }
+
+    fn too_large(&self, name: &str, bytes: u64) -> WebError {
+        too_large(name, bytes, self.memory)
+    }
+
+    fn forecast(&self, survey: &Survey, options: &BuildOptions) -> Forecast {
+        let files = self.files.iter().map(InputFile::size).sum();
+        Forecast::of(survey, files, self.files.len() as u64, options)
+    }
+
+    /// Refuses fields that are not there before anything is read.
+    fn check_fields(survey: &Survey, options: &BuildOptions) -> Result<(), WebError> {
+        let BuildOptions { config, cells, .. } = options;
+        let has = |fields: &[Field], name: &str| fields.iter().any(|field| field.answers_to(name));
+        for name in &config.fields {
+            let is_there = has(&survey.fields, name) || *cells && has(&survey.cell_fields, name);
+            if is_there || GeometryField::named(name).is_some() && !has(&survey.cell_fields, name) {
+                continue;
+            }
+            if has(&survey.cell_fields, name) {
+                return Err(BuildError::CellField { name: name.clone() }.into());
+            }
+            let all = survey.fields.iter().chain(survey.cell_fields.iter().filter(|_| *cells));
+            let known = all.map(|field| field.name.clone()).collect();
+            return Err(BuildError::UnknownField { name: name.clone(), known }.into());
+        }
+        Ok(())
+    }
+
+    fn build_of(&mut self, options: BuildOptions, mut stages: Stages<'_>) -> Result<JsBuilt, WebError> {
+        let BuildOptions { config, cells, repair: level, units, metadata } = options;
+        let name = self.files.first().map(|file| file.name.clone()).unwrap_or_default();
+        let mesh = self.read(&config, cells, &mut stages)?;
+        let notes = mesh.notes.clone();
+        stages.begin("repair")?;
+        let (mut mesh, repaired) = if mesh.tets.is_empty() {
+            expect_points(&mesh, &config, &name)?;
+            (mesh, None)
+        } else {
+            let bad_mesh = |error| bad_mesh(&name, &error);
+            let (mesh, done) = mesh::repair_at(mesh, level).map_err(bad_mesh)?;
+            let found = mesh::findings(&mesh, level.weld_distance()).map_err(bad_mesh)?;
+            (mesh, Some((done, RepairObject::of(level, &done, &found))))
+        };
+        if cells {
+            mesh.cells_to_points();
+        }
+        mesh.add_geometry_fields(&config.fields);
+        set_units(&mut mesh, &units)?;
+        let built = builder::build_owned(mesh, &config, &mut |step| stages.step(&step));
+        let built = built.map_err(|error| in_input(&name, &error))?;
+        stages.begin("encode")?;
+        let built_by = config.construction.metadata().into_iter().chain(level.metadata());
+        let metadata = built_by.chain(metadata).collect();
+        let encoding = EncodeOptions { check_margins: true, exact: built.exact, histograms: true, metadata };
+        let bytes = encode(&built.mt, &encoding)?;
+        let (repaired, repair) =
+            repaired.map_or_else(Default::default, |(done, repair)| (done.to_string(), Some(repair)));
+        Ok(result(&bytes, &config, &built.summary, &repaired, repair, &notes))
+    }
+
+    /// The mesh as the files have it. Each file is dropped when it was read.
+    fn read(
+        &mut self,
+        config: &BuildConfig,
+        cells: bool,
+        stages: &mut Stages<'_>,
+    ) -> Result<TetMesh, WebError> {
+        let files = std::mem::take(&mut self.files);
+        let steps: Vec<_> = files.iter().map(|file| (file.name.clone(), None)).collect();
+        let mut files: Vec<_> = files.into_iter().map(Some).collect();
+        let total = steps.len() as u64;
+        let cells = if cells { CellData::Values } else { CellData::Names };
+        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, labels: &[], cells };
+        let memory = MemoryLimit::of(self.memory);
+        let mut read = |number: usize, options: &ReadOptions| {
+            let options = &ReadOptions { memory: memory.clone(), ..options.clone() };
+            let file = files.get_mut(number).and_then(Option::take).unwrap_or_default();
+            stages.count("parse", number as u64, total);
+            file.read(options)
+        };
+        let mesh = read_time_steps(&steps, &wanted, &mut read)?;
+        if stages.stopped { Err(BuildError::Stopped.into()) } else { Ok(mesh) }
+    }
+}
+
+/// Tells JavaScript how far the work is.
+struct Stages<'a> {
+    progress: &'a Function,
+    stopped: bool,
+}
+
+impl Stages<'_> {
+    fn tell(&mut self, stage: &str, done: u64, total: u64, tetrahedra: Option<u32>) {
+        let numbers = js_sys::Array::of4(
+            &stage.into(),
+            &(done as f64).into(),
+            &(total as f64).into(),
+            &tetrahedra.map_or(JsValue::UNDEFINED, Into::into),
+        );
+        // A function that throws stops the work, too.
+        let goes_on = self.progress.apply(&JsValue::UNDEFINED, &numbers).is_ok_and(|stop| stop.is_falsy());
+        self.stopped |= !goes_on;
+    }
+
+    fn count(&mut self, stage: &str, done: u64, total: u64) {
+        self.tell(stage, done, total, None);
+    }
+
+    fn begin(&mut self, stage: &str) -> Result<(), WebError> {
+        self.count(stage, 0, 1);
+        if self.stopped { Err(BuildError::Stopped.into()) } else { Ok(()) }
+    }
+
+    fn step(&mut self, step: &BuildProgress) -> ControlFlow<()> {
+        self.tell(step.stage, step.done, step.total, step.tetrahedra);
+        if self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// Points without cells go with insertion alone.
+fn expect_points(mesh: &TetMesh, config: &BuildConfig, name: &str) -> Result<(), WebError> {
+    if !config.construction.method().keeps_the_mesh() {
+        return Ok(());
+    }
+    if mesh.positions.is_empty() {
+        return Err(bad_mesh(name, &MeshError::Empty));
+    }
+    let what = "there are points but no tetrahedra; method \"insert\" with kind \"vertex\" makes an MT of points alone";
+    Err(WebError::new("bad-mesh", format!("{name}: {what}")))
+}
+
+fn set_units(mesh: &mut TetMesh, units: &[(String, String)]) -> Result<(), WebError> {
+    for (name, unit) in units {
+        let is_meant = |field: &&mut Field| {
+            field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+        };
+        let mut found = false;
+        mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
+            field.unit.clone_from(unit);
+            found = true;
+        });
+        if !found {
+            return Err(WebError::bad_option("units", &format!("there is no field '{name}'")));
+        }
+    }
+    Ok(())
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct InfoObject<'a> {
+    format: &'static str,
+    points: f64,
+    tetrahedra: f64,
+    dims: Option<[u32; 3]>,
+    bounds: Option<[f64; 6]>,
+    fields: Vec<FieldObject<'a>>,
+    memory: MemoryObject,
+}
+
+#[derive(Serialize)]
+struct FieldObject<'a> {
+    name: &'a str,
+    at: &'static str,
+    unit: &'a str,
+    vector: Option<VectorObject<'a>>,
+}
+
+#[derive(Serialize)]
+struct VectorObject<'a> {
+    name: &'a str,
+    component: Option<u8>,
+}
+
+#[derive(Serialize)]
+struct MemoryObject {
+    needed: f64,
+    available: f64,
+    fits: bool,
+}
+
+fn info(survey: &Survey, bounds: Option<Bounds>, needed: u64, available: u64) -> JsInputInfo {
+    let at_points = survey.fields.iter().map(|field| field_object("points", field));
+    let at_cells = survey.cell_fields.iter().map(|field| field_object("cells", field));
+    object(&InfoObject {
+        format: survey.format,
+        points: survey.points as f64,
+        tetrahedra: survey.cells as f64,
+        dims: survey.grid.map(|grid| grid.dims),
+        bounds: bounds.map(|Bounds { min: [x0, y0, z0], max: [x1, y1, z1] }| [x0, y0, z0, x1, y1, z1]),
+        fields: at_points.chain(at_cells).collect(),
+        memory: MemoryObject {
+            needed: needed as f64,
+            available: available as f64,
+            fits: needed <= available,
+        },
+    })
+    .unchecked_into()
+}
+
+fn field_object<'a>(at: &'static str, field: &'a Field) -> FieldObject<'a> {
+    let vector = field.vector.as_ref();
+    let vector = vector.map(|part| VectorObject { name: &part.name, component: part.component });
+    FieldObject { name: &field.name, at, unit: &field.unit, vector }
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct ReportObject<'a> {
+    kind: &'static str,
+    method: &'static str,
+    criterion: Option<&'static str>,
+    vertices: u32,
+    tetrahedra: u32,
+    base_vertices: u32,
+    base_tetrahedra: u32,
+    updates: u32,
+    depth: u32,
+    position_bits: u32,
+    repaired: &'a str,
+    repair: Option<RepairObject>,
+    notes: &'a [String],
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct RepairObject {
+    level: &'static str,
+    weld_distance: f64,
+    merged_points: usize,
+    welded_points: usize,
+    differing_values: usize,
+    collapsed_tetrahedra: usize,
+    duplicate_tetrahedra: usize,
+    turned_tetrahedra: usize,
+    flat_tetrahedra: usize,
+    unused_points: usize,
+    kept: String,
+    components: usize,
+    non_manifold_edges: usize,
+    non_manifold_vertices: usize,
+    open_seam_faces: usize,
+    weldable_faces: usize,
+}
+
+impl RepairObject {
+    fn of(level: RepairLevel, done: &RepairReport, found: &MeshFindings) -> Self {
+        Self {
+            level: level.name(),
+            weld_distance: level.weld_distance(),
+            merged_points: done.merged_points,
+            welded_points: done.welded_points,
+            differing_values: done.differing_values,
+            collapsed_tetrahedra: done.collapsed_tets,
+            duplicate_tetrahedra: done.duplicate_tets,
+            turned_tetrahedra: done.turned_tets,
+            flat_tetrahedra: done.flat_tets,
+            unused_points: done.unused_points,
+            kept: found.to_string(),
+            components: found.components,
+            non_manifold_edges: found.non_manifold_edges,
+            non_manifold_vertices: found.non_manifold_vertices,
+            open_seam_faces: found.open_seam_faces,
+            weldable_faces: found.weldable_faces,
+        }
+    }
+}
+
+fn result(
+    bytes: &[u8],
+    config: &BuildConfig,
+    summary: &BuildSummary,
+    repaired: &str,
+    repair: Option<RepairObject>,
+    notes: &[String],
+) -> JsBuilt {
+    let construction = config.construction;
+    let report = object(&ReportObject {
+        kind: construction.kind().name(),
+        method: construction.method().name(),
+        criterion: construction.criterion().map(builder::BuildCriterion::name),
+        vertices: summary.vertices,
+        tetrahedra: summary.tetrahedra,
+        base_vertices: summary.base_vertices,
+        base_tetrahedra: summary.base_tetrahedra,
+        updates: summary.updates,
+        depth: summary.depth,
+        position_bits: summary.position_bits,
+        repaired,
+        repair,
+        notes,
+    });
+    let built = Object::new();
+    for (name, value) in [("bytes", Uint8Array::from(bytes).into()), ("report", report)] {
+        // Setting a property on a fresh ordinary object cannot fail.
+        let _ = Reflect::set(&built, &name.into(), &value);
+    }
+    built.unchecked_into()
+}
+
+fn object(described: &impl Serialize) -> JsValue {
+    serde_wasm_bindgen::to_value(described).unwrap_or_default()
+}
+
+fn no_file() -> WebError {
+    WebError::new("bad-source", "no file is given".to_owned())
+}
+
+fn too_large(name: &str, bytes: u64, memory: u64) -> WebError {
+    let [bytes, memory] = [bytes, memory].map(megabytes);
+    let remedy = "use the command `tetralod build`";
+    WebError::new(
+        "memory",
+        format!("{name}: the files have {bytes} MB, but there are {memory} MB of memory; {remedy}"),
+    )
+}
+
+fn no_memory(survey: &Survey, needed: u64, memory: u64) -> WebError {
+    let [needed, memory] = [needed, memory].map(megabytes);
+    let remedy = "choose fewer fields, or use the command `tetralod build`";
+    WebError::new(
+        "memory",
+        format!(
+            "building {} tetrahedra needs about {needed} MB of memory, but there are {memory} MB; {remedy}",
+            survey.cells
+        ),
+    )
+}
+
+fn megabytes(bytes: u64) -> u64 {
+    bytes.div_ceil(1_000_000)
+}
+
+fn bad_mesh(name: &str, error: &MeshError) -> WebError {
+    WebError::new("bad-mesh", format!("{name}: {error}"))
+}
+
+/// An error of the builder with the name of the file, where it is about what that contains.
+fn in_input(name: &str, error: &BuildError) -> WebError {
+    let option = error.remedy().map(|remedy| format!(" (option {})", options_of(remedy)));
+    let place = if error.code() == "bad-mesh" { format!("{name}: ") } else { String::new() };
+    WebError::new(error.code(), format!("{place}{error}{}", option.unwrap_or_default()))
+}
+
+/// The options of the page that do what a remedy says.
+fn options_of(remedy: Remedy) -> &'static str {
+    match remedy {
+        Remedy::Insert | Remedy::Decimate => "`method`",
+        Remedy::Field => "`fields`",
+        Remedy::CellsToPoints => "`cellToPoint`",
+        Remedy::FieldTolerance => "`fieldTolerance` or `lossless`",
+        Remedy::PositionTolerance => "`positionTolerance`",
+        Remedy::PositionBits => "`positionBits`",
+    }
+}

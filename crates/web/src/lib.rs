@@ -1,0 +1,18 @@
+//! What the wasm modules of the npm package have in common: options that are read, results that are handed out, files that arrive. A thin
+//! façade over [`tetralod::session`] for wasm-bindgen. The package's JavaScript (`pkg-template/`) wraps it with streams, workers and
+//! promises; nothing here waits or does I/O.
+
+pub mod arrays;
+pub mod callback;
+pub mod error;
+pub mod file;
+pub mod given;
+pub mod loader;
+pub mod mesh_changes;
+pub mod mesh_tools;
+pub mod options;
+pub mod read_error;
+pub mod reader;
+pub mod results;
+pub mod stored;
+pub mod tools;

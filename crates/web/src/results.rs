@@ -1,0 +1,165 @@
+//! What JavaScript gets of a session: plain objects, and typed arrays that own their memory.
+
+use crate::arrays::{doubles, integers, list, object, record, set};
+use crate::options::Asked;
+use crate::stored::Stored;
+use js_sys::Array;
+use tetralod::geom::Bounds;
+use tetralod::mt::{FieldInfo, MtInfo};
+use tetralod::refine::RefineStats;
+use tetralod::session::{BlockProgress, Progress, Session};
+use tetralod::view::MeshView;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = include_str!("results.d.ts");
+
+#[wasm_bindgen]
+extern "C" {
+    /// Decoding progress as a plain object.
+    #[wasm_bindgen(typescript_type = "Progress")]
+    pub type JsProgress;
+    /// How the blocks stand.
+    #[wasm_bindgen(typescript_type = "BlockProgress")]
+    pub type JsBlocks;
+    /// What is known of the MT, or `undefined`.
+    #[wasm_bindgen(typescript_type = "MtInfo | undefined")]
+    pub type JsInfo;
+    /// The outcome of a refinement as a plain object.
+    #[wasm_bindgen(typescript_type = "CoreStats")]
+    pub type JsStats;
+    /// A mesh as typed arrays.
+    #[wasm_bindgen(typescript_type = "Mesh & { changes: MeshChanges }")]
+    pub type JsMesh;
+    /// What has changed in a mesh, as typed arrays.
+    #[wasm_bindgen(typescript_type = "MeshDelta")]
+    pub type JsDelta;
+}
+
+/// `progress` for JavaScript.
+pub fn progress(progress: &Progress) -> JsProgress {
+    let Progress { ready, complete, bytes, total, updates } = *progress;
+    object(&[
+        ("ready", ready.into()),
+        ("complete", complete.into()),
+        ("bytes", (bytes as f64).into()),
+        ("total", total.map(|total| total as f64).into()),
+        ("updates", updates.into()),
+    ])
+}
+
+/// How the blocks stand, for JavaScript.
+pub fn blocks(progress: &BlockProgress) -> JsBlocks {
+    let BlockProgress { blocks, here, needed, left_out, bytes } = *progress;
+    let counts = [blocks, here, needed, left_out].map(f64::from);
+    let [all, here, needed, left_out] = counts;
+    record(&["all", "here", "needed", "leftOut", "bytes"], &[all, here, needed, left_out, bytes as f64])
+}
+
+/// What is known of the MT of a session, for JavaScript.
+pub fn info(session: &Session) -> Option<JsInfo> {
+    let info = session.info()?;
+    let Bounds { min: [x0, y0, z0], max: [x1, y1, z1] } = session.bounds()?;
+    let fields: Array = (0..info.fields.len()).map(|index| field(session, info, index)).collect();
+    Some(object(&[
+        ("kind", info.kind.name().into()),
+        ("fields", fields.into()),
+        ("bounds", list(&[x0, y0, z0, x1, y1, z1])),
+        ("origin", list(&info.single_points().origin)),
+        ("vertices", info.vertices.into()),
+        ("tetrahedra", info.tetrahedra.into()),
+        ("updates", info.updates.into()),
+        ("exactValues", session.decoder().exact_status().name().into()),
+    ]))
+}
+
+fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
+    let FieldInfo { name, min, max, bits, unit, time, vector, .. } = &info.fields[index];
+    let vector = vector.as_ref().map(|part| {
+        object(&[("name", part.name.as_str().into()), ("component", part.component.map(f64::from).into())])
+    });
+    let histogram = session.decoder().histogram(index).map_or(JsValue::NULL, |shares| doubles(&shares));
+    let curve = session.bytes_by_error(index);
+    let errors: Vec<f64> = curve.iter().map(|point| point.error_in_units(&info.fields[index])).collect();
+    let bytes: Vec<f64> = curve.iter().map(|point| point.bytes as f64).collect();
+    let single = info.fields[index].single_values();
+    object(&[
+        ("name", name.as_str().into()),
+        ("min", (*min).into()),
+        ("max", (*max).into()),
+        ("bits", (*bits).into()),
+        ("offset", single.offset.into()),
+        ("scale", single.unit.into()),
+        ("unit", unit.as_str().into()),
+        ("time", (*time).into()),
+        ("vector", vector.unwrap_or(JsValue::UNDEFINED)),
+        ("floor", (info.floor(index) * info.fields[index].range()).into()),
+        ("histogram", histogram),
+        ("curve", object(&[("errors", doubles(&errors)), ("bytes", doubles(&bytes))])),
+    ])
+}
+
+/// The numbers among the members of the object for [`RefineStats`].
+const STATS: [&str; 12] = [
+    "vertices",
+    "tetrahedra",
+    "applied",
+    "refined",
+    "coarsened",
+    "forced",
+    "judged",
+    "errorBound",
+    "relativeErrorBound",
+    "fieldBound",
+    "boundaryBound",
+    "excess",
+];
+
+/// `stats` for JavaScript, in the units of what was asked for.
+pub fn stats(stats: &RefineStats, info: &MtInfo, asked: &Asked) -> JsStats {
+    let numbers = [
+        f64::from(stats.vertices),
+        f64::from(stats.tetrahedra),
+        f64::from(stats.applied),
+        stats.refined as f64,
+        stats.coarsened as f64,
+        stats.forced as f64,
+        stats.judged as f64,
+        stats.error_bound * info.fields[asked.field].range(),
+        stats.error_bound,
+        info.field_bound(asked.field, stats.error_bound),
+        info.boundary_bound(stats.error_bound),
+        stats.excess,
+    ];
+    let js: JsStats = record(&STATS, &numbers);
+    let bounds: Vec<f64> = stats.bounds.iter().zip(&asked.units).map(|(bound, unit)| bound * unit).collect();
+    set(js.as_ref(), "bounds", &list(&bounds));
+    for (name, answer) in [("satisfied", stats.satisfied), ("missing", stats.missing), ("done", stats.done)] {
+        set(js.as_ref(), name, &answer.into());
+    }
+    js
+}
+
+/// The arrays of a mesh; of a set of them, bit `i` is that of the `i`-th.
+const ARRAYS: [&str; 4] = ["positions", "field", "tets", "neighbors"];
+
+/// A copy of the `wanted` arrays of `mesh` outside wasm memory.
+pub fn mesh_arrays(mesh: &MeshView<'_>, stored: &Stored, wanted: u32) -> JsMesh {
+    let arrays: JsMesh = object(&[]);
+    stored.put(arrays.as_ref());
+    put_arrays(arrays.as_ref(), wanted, |at| match at {
+        0 => stored.positions(mesh.positions.iter().copied()),
+        1 => stored.values(mesh.field.iter().copied()),
+        2 => integers(mesh.tets.as_flattened()),
+        _ => integers(mesh.neighbors.as_flattened()),
+    });
+    arrays
+}
+
+/// Puts the `wanted` ones of the arrays of a mesh into `object`.
+pub fn put_arrays(object: &JsValue, wanted: u32, array: impl Fn(usize) -> JsValue) {
+    for (at, name) in ARRAYS.iter().enumerate().filter(|(at, _)| wanted >> at & 1 == 1) {
+        set(object, name, &array(at));
+    }
+}
