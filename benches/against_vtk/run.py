@@ -55,17 +55,16 @@ class Volume:
         self.built = json.loads(report)
 
     def meshes(self):
-        """For each share the meshes of equal size, of tetralod with its own values and with fitted ones, and what VTK took."""
+        """For each share the meshes of equal size, of tetralod and of VTK, and what VTK took."""
         for share in SHARES:
-            own, fitted, theirs = (self.folder / f"{tool}{share}.vtu" for tool in ("tetralod", "fitted", "vtk"))
+            own, theirs = (self.folder / f"{tool}{share}.vtu" for tool in ("tetralod", "vtk"))
             took, failure = decimated(self.mesh, self.field, share, theirs)
             if failure:
                 yield share, None, failure, None
                 continue
             arguments = ["extract", self.mt, "--budget", took["tets"], "--json", "-o"]
             bound = json.loads(run([self.tetralod, *arguments, own])[0])["relative_error_bound"]
-            run([self.tetralod, *arguments, fitted, "--fit", self.mesh])
-            yield share, (own, fitted, theirs), took, bound
+            yield share, (own, theirs), took, bound
             if took["tets"] > (1 + STUCK) * share * self.built["tetrahedra"]:
                 # It went no further, and would not for less.
                 return
@@ -75,8 +74,8 @@ def percent(part):
     return f"{100 * part:.3g}"
 
 
-def three(rows, key):
-    """The numbers of the three meshes, the least one bold."""
+def both(rows, key):
+    """The numbers of the two meshes, the least one bold."""
     least = min(row[key] for row in rows)
     return " | ".join(f"**{percent(row[key])}**" if row[key] == least else percent(row[key]) for row in rows)
 
@@ -88,7 +87,7 @@ def counts(ours, theirs, key):
 def main(tetralod, measure, folder, *inputs):
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    errors, costs, wins, rows = [], [], [{"max": 0, "rms": 0}, {"max": 0, "rms": 0}], 0
+    errors, costs, won, rows = [], [], {"max": 0, "rms": 0}, 0
     for path in map(Path, inputs):
         print(path, file=sys.stderr)
         volume = Volume((tetralod, measure), folder, path)
@@ -96,20 +95,19 @@ def main(tetralod, measure, folder, *inputs):
         for share, meshes, took, bound in volume.meshes():
             head = f"| {volume.name} | {percent(share)} "
             if meshes is None:
-                errors.append(f"{head}| VTK {took} | | | | | | | | | | | | | |")
+                errors.append(f"{head}| VTK {took} | | | | | | | | | | | |")
                 continue
             lines = run([measure, "compare", volume.mesh, *meshes])[0].splitlines()
             whole, *found = map(json.loads, lines)
-            ours, fitted, theirs = found
+            ours, theirs = found
             of_vtk.append((took, theirs["tets"]))
             if ours["tets"] <= theirs["tets"]:
                 rows += 1
-                for won, mesh in zip(wins, (ours, fitted)):
-                    for key in won:
-                        won[key] += mesh[key] <= theirs[key]
+                for key in won:
+                    won[key] += ours[key] <= theirs[key]
             errors.append(
-                f"{head}| {counts(ours, theirs, 'tets')} | {percent(bound)} | {three(found, 'max')} "
-                f"| {three(found, 'rms')} | {counts(ours, theirs, 'outside')} | {counts(ours, theirs, 'turned')} "
+                f"{head}| {counts(ours, theirs, 'tets')} | {percent(bound)} | {both(found, 'max')} "
+                f"| {both(found, 'rms')} | {counts(ours, theirs, 'outside')} | {counts(ours, theirs, 'turned')} "
                 f"| {percent(ours['volume'] / whole['volume'] - 1)} | {percent(theirs['volume'] / whole['volume'] - 1)} |"
             )
         removed = volume.built["tetrahedra"] - volume.built["base_tetrahedra"]
@@ -123,12 +121,11 @@ def main(tetralod, measure, folder, *inputs):
         else:
             cost += "| – | – | – |"
         costs.append(cost)
-    own, fit = wins
-    print(f"Of {rows} pairs of meshes of equal size tetralod has the lower or the same maximum in {own['max']}, root of the mean square in "
-          f"{own['rms']}; with fitted values in {fit['max']} and {fit['rms']}.\n")
-    print("| set | of the input % | tets | VTK's | bound % | max % | fitted | VTK's | RMS % | fitted | VTK's | outside | VTK's | turned "
-          "| VTK's | volume % | VTK's |")
-    print("|---|--:" + "|--:" * 15 + "|")
+    print(f"Of {rows} pairs of meshes of equal size tetralod has the lower or the same maximum in {won['max']}, root of the mean square in "
+          f"{won['rms']}.\n")
+    print("| set | of the input % | tets | VTK's | bound % | max % | VTK's | RMS % | VTK's | outside | VTK's | turned | VTK's | volume % "
+          "| VTK's |")
+    print("|---|--:" + "|--:" * 13 + "|")
     print("\n".join(errors))
     print("\n| set | tets | build s | thousand/s | MB | VTK, to the least s | thousand/s | MB |")
     print("|---|--:" + "|--:" * 6 + "|")

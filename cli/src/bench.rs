@@ -34,32 +34,7 @@ struct Report {
     refine: Refine,
     coarsen: Updates,
     isosurface: Tets,
-    #[serde(with = "Walks")]
     coherent: bench::Walks,
-    bytes_per_tet: f64,
-}
-
-/// Requests that change a little from frame to frame.
-#[derive(Serialize)]
-#[serde(remote = "bench::Walks")]
-struct Walks {
-    #[serde(rename = "box", with = "Walk")]
-    roi: bench::Coherent,
-    #[serde(with = "Walk")]
-    iso: bench::Coherent,
-    #[serde(with = "Walk")]
-    view: bench::Coherent,
-}
-
-#[derive(Serialize)]
-#[serde(remote = "bench::Coherent")]
-struct Walk {
-    median_ms: f64,
-    p95_ms: f64,
-    cold_ms: f64,
-    updates: u64,
-    cold_updates: u64,
-    tetrahedra: u32,
     bytes_per_tet: f64,
 }
 

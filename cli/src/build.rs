@@ -79,8 +79,8 @@ pub struct BuildOptions {
     /// decimate].
     #[arg(long, value_name = "CRITERION", value_parser = criterion)]
     criterion: Option<BuildCriterion>,
-    /// What it is for, with decimate: uniform, the fewest tetrahedra at one error everywhere; regions, which then take
-    /// less around them with them; or mean, a smaller mean error at the same number of tetrahedra [default: uniform].
+    /// What it is for, with decimate: uniform, the fewest tetrahedra at one error everywhere; or regions, which then take
+    /// less around them with them [default: uniform].
     #[arg(long = "for", value_name = "PURPOSE", value_parser = purpose)]
     purpose: Option<Purpose>,
     /// Keep for each tetrahedron how far its own error is below that of the update that removes it: requests take fewer
@@ -233,13 +233,8 @@ struct Report {
     method: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     criterion: Option<&'static str>,
-    vertices: u32,
-    tetrahedra: u32,
-    base_vertices: u32,
-    base_tetrahedra: u32,
-    updates: u32,
-    depth: u32,
-    position_bits: u32,
+    #[serde(flatten)]
+    counts: BuildSummary,
     /// How far interfaces between regions have moved, in model units, if they may.
     #[serde(skip_serializing_if = "Option::is_none")]
     interface_deviation: Option<f64>,
@@ -691,13 +686,7 @@ fn report(
         kind: config.construction.kind().name(),
         method: config.construction.method().name(),
         criterion: config.construction.criterion().map(BuildCriterion::name),
-        vertices: summary.vertices,
-        tetrahedra: summary.tetrahedra,
-        base_vertices: summary.base_vertices,
-        base_tetrahedra: summary.base_tetrahedra,
-        updates: summary.updates,
-        depth: summary.depth,
-        position_bits: summary.position_bits,
+        counts: *summary,
         interface_deviation: (config.preserve_within > 0.0).then_some(summary.interface_deviation),
         file_bytes,
         bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
@@ -709,17 +698,23 @@ fn report(
     }
 }
 
+/// The counts of a build for people.
+pub fn rows_of(counts: &BuildSummary) -> [(&'static str, String); 3] {
+    let &BuildSummary { vertices, tetrahedra, base_vertices, base_tetrahedra, updates, depth, .. } = counts;
+    [
+        ("reference mesh", output::mesh(vertices, tetrahedra)),
+        ("base mesh", output::mesh(base_vertices, base_tetrahedra)),
+        ("updates", format!("{}, at most {} deep", output::count(updates), output::count(depth))),
+    ]
+}
+
 fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
-    let removed = f64::from(report.tetrahedra.saturating_sub(report.base_tetrahedra));
-    let mut rows = vec![
-        ("file", output.display().to_string()),
-        ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
-        ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
-        (
-            "updates",
-            format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
-        ),
-        ("position bits", report.position_bits.to_string()),
+    let counts = &report.counts;
+    let removed = f64::from(counts.tetrahedra.saturating_sub(counts.base_tetrahedra));
+    let mut rows = vec![("file", output.display().to_string())];
+    rows.extend(rows_of(counts));
+    rows.extend([
+        ("position bits", counts.position_bits.to_string()),
         ("file size", output::bytes(report.file_bytes)),
         ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
         (
@@ -730,7 +725,7 @@ fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
                 removed / report.seconds
             ),
         ),
-    ];
+    ]);
     let moved = report
         .interface_deviation
         .map(|moved| ("interfaces moved", format!("{} at most", output::number(moved))));

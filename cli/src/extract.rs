@@ -9,7 +9,7 @@ use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo};
 use tetralod::refine;
 use tetralod::session::Session;
-use tetralod_build::measure::{Fit, Part, Promise, Reference, deviation, fit};
+use tetralod_build::measure::{Part, Promise, Reference, deviation};
 
 /// Takes the mesh out of an MT file that is as coarse as a request allows.
 #[derive(clap::Args)]
@@ -23,10 +23,6 @@ pub struct Arguments {
     /// Compare with the mesh that the MT was built from, where regions and values (or nothing) say that the field matters.
     #[arg(long, value_name = "INPUT")]
     measure: Option<PathBuf>,
-    /// Write values that fit those of the mesh that the MT was built from best, instead of its values at the same vertices: the mean error gets a
-    /// fifth to a quarter smaller. For meshes of one error everywhere, and budgets.
-    #[arg(long, value_name = "INPUT", conflicts_with = "measure")]
-    fit: Option<PathBuf>,
 }
 
 /// The result as programs get it. Errors are in units of the field, relative ones as fractions of its range.
@@ -34,18 +30,7 @@ pub struct Arguments {
 struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     measured_error: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fit: Option<FitReport>,
     hash: String,
-}
-
-/// The differences from the input that `--fit` leaves, and those before.
-#[derive(Serialize)]
-struct FitReport {
-    largest: f64,
-    largest_before: f64,
-    root_mean_square: f64,
-    root_mean_square_before: f64,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -53,89 +38,28 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !is_npz {
         files::check_ending(&arguments.output, "vtu")?;
     }
-    let inputs = arguments.measure.iter().chain(&arguments.fit).chain(arguments.query.files());
+    let inputs = arguments.measure.iter().chain(arguments.query.files());
     files::check_output(&arguments.output, inputs)?;
     let answer = arguments.query.answer_exactly()?;
     let opened = &answer.opened;
-    // What is fitted to must be the mesh of the MT, too.
-    let input = arguments.measure.as_deref().or(arguments.fit.as_deref());
+    let input = arguments.measure.as_deref();
     let measured = input.map(|input| measure(input, &answer)).transpose()?.flatten();
-    if let (Some(measured), Some(input)) = (&measured, &arguments.fit) {
-        // Nothing is fitted to another mesh.
-        measured.check(input)?;
-    }
     let mesh = opened.session.mesh().context("there is no mesh")?;
-    let mut mesh = reference_units(&opened.session, opened.info()?, mesh);
-    let fitted = arguments.fit.as_deref().map(|input| fit_fields(input, &answer, &mut mesh)).transpose()?;
+    let mesh = reference_units(&opened.session, opened.info()?, mesh);
     if is_npz {
         npz::write_mesh(&mesh, &arguments.output)?;
     } else {
         files::write_file(&arguments.output, |out| Ok(tetralod_io::write_vtu(&mesh, out)?))?;
     }
     let report = Report {
-        measured_error: measured.as_ref().filter(|_| fitted.is_none()).map(|measured| measured.error),
-        fit: fitted.flatten().as_ref().map(FitReport::of),
+        measured_error: measured.as_ref().map(|measured| measured.error),
         hash: format!("{:016x}", opened.session.hash()),
     };
     let mut after = vec![("hash", report.hash.clone())];
-    if let Some(fit) = &report.fit {
-        after.extend(fit.rows(opened.info()?.fields[answer.field].range()));
-    }
     after.extend(report.measured_error.map(|error| ("measured error", output::number(error))));
     let rows = [vec![("file", arguments.output.display().to_string())], after];
     arguments.query.print_around(&report, rows, (&answer.summary, answer.seconds))?;
     measured.zip(input).map_or(Ok(()), |(measured, input)| measured.check(input))
-}
-
-impl FitReport {
-    fn of(fit: &Fit) -> Self {
-        Self {
-            largest: fit.after.largest,
-            largest_before: fit.before.largest,
-            root_mean_square: fit.after.root_mean_square,
-            root_mean_square_before: fit.before.root_mean_square,
-        }
-    }
-
-    fn rows(&self, range: f64) -> [(&'static str, String); 2] {
-        let row = |now: f64, before: f64| {
-            let part = |value: f64| output::percent(value / range);
-            format!("{} ({} of the range; before the fit {})", output::number(now), part(now), part(before))
-        };
-        [
-            ("measured error", row(self.largest, self.largest_before)),
-            ("root mean square", row(self.root_mean_square, self.root_mean_square_before)),
-        ]
-    }
-}
-
-/// Replaces the values of all fields that the input has by those that fit it best; returns how well those of the field do that is asked for.
-fn fit_fields(input: &Path, answer: &Answer, written: &mut TetMesh) -> Result<Option<Fit>> {
-    if answer.needs.iter().any(|named| named.need.part != refine::Part::Everywhere) {
-        bail!(
-            "--fit is for meshes of one error everywhere: what is fitted outside of a region or of values changes them inside, too"
-        );
-    }
-    let opened = &answer.opened;
-    let (info, mesh) = (opened.info()?, opened.session.mesh().context("there is no mesh")?);
-    let reference = input::read_reference(&[input.to_owned()], opened)?;
-    let mut asked = None;
-    for (f, (own, target)) in info.fields.iter().zip(&mut written.fields).enumerate() {
-        let found = reference.fields.iter().find(|field| own.is_of(field)).with_context(|| {
-            format!(
-                "{}: there is no field '{}'; give the mesh that the MT was built from",
-                input.display(),
-                own.name
-            )
-        })?;
-        let of = Reference { positions: &reference.positions, values: &found.values, field: f };
-        let mut fit = fit(info, mesh, &of);
-        target.values = std::mem::take(&mut fit.values);
-        if f == answer.field {
-            asked = Some(fit);
-        }
-    }
-    Ok(asked)
 }
 
 /// Bounds and errors are computed in doubles.

@@ -80,7 +80,7 @@ struct Field {
     #[serde(skip_serializing_if = "String::is_empty")]
     unit: String,
     #[serde(skip_serializing_if = "Option::is_none")]
-    vector: Option<Vector>,
+    vector: Option<VectorPart>,
     #[serde(skip_serializing_if = "Option::is_none")]
     time: Option<f64>,
     min: f64,
@@ -103,14 +103,6 @@ struct CurvePoint {
     error: Option<f64>,
     /// Of the file, from its beginning on.
     bytes: u64,
-}
-
-/// Which part of a vector a field is; its length if there is no component.
-#[derive(Serialize)]
-struct Vector {
-    name: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    component: Option<u8>,
 }
 
 /// What can be fetched of the file by itself.
@@ -209,7 +201,6 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
     let structure = structure.map(|(structure, _)| structure);
     let field = |(number, field): (usize, &FieldInfo)| {
         let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
-        let vector = vector.map(|VectorPart { name, component }| Vector { name, component });
         let floor = info.floor(number);
         let (histogram, curve) = (opened.session.decoder().histogram(number), curve(opened, number));
         Field { name, unit, vector, time, min, max, bits, quantization, floor, histogram, curve }
@@ -303,8 +294,10 @@ fn rounded(by: f64) -> String {
 fn field_row(steps: &[Field]) -> String {
     let Field { name, unit, vector, time, min, max, bits, .. } = &steps[0];
     let part = match vector {
-        Some(Vector { name, component: Some(component) }) => format!(" (component {component} of {name})"),
-        Some(Vector { name, component: None }) => format!(" (length of {name})"),
+        Some(VectorPart { name, component: Some(component) }) => {
+            format!(" (component {component} of {name})")
+        }
+        Some(VectorPart { name, component: None }) => format!(" (length of {name})"),
         None => String::new(),
     };
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };

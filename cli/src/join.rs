@@ -1,14 +1,14 @@
 //! `tetralod join`: parts that are built to one MT file.
 
 use super::output::{self, Verbosity};
-use super::{files, parts};
+use super::{build, files, parts};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;
 use tetralod::format::{EncodeOptions, encode_to};
-use tetralod_build::BuildResult;
 use tetralod_build::parts::Node;
+use tetralod_build::{BuildResult, BuildSummary};
 
 /// Joins parts that `tetralod build --part` has built: with --node eight of one level to one of the next, with -o all that has been
 /// built to one MT file.
@@ -30,12 +30,8 @@ pub struct Arguments {
 /// The summary as programs get it.
 #[derive(Serialize)]
 struct Report {
-    vertices: u32,
-    tetrahedra: u32,
-    base_vertices: u32,
-    base_tetrahedra: u32,
-    updates: u32,
-    depth: u32,
+    #[serde(flatten)]
+    counts: BuildSummary,
     file_bytes: u64,
 }
 
@@ -54,26 +50,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let options =
         EncodeOptions { check_margins: true, exact, histograms: true, metadata: plan.metadata().clone() };
     let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
-    let report = Report {
-        vertices: summary.vertices,
-        tetrahedra: summary.tetrahedra,
-        base_vertices: summary.base_vertices,
-        base_tetrahedra: summary.base_tetrahedra,
-        updates: summary.updates,
-        depth: summary.depth,
-        file_bytes,
-    };
-    verbosity.print(
-        &report,
-        &[
-            ("file", output.display().to_string()),
-            ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
-            ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
-            (
-                "updates",
-                format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
-            ),
-            ("file size", output::bytes(report.file_bytes)),
-        ],
-    )
+    let mut rows = vec![("file", output.display().to_string())];
+    rows.extend(build::rows_of(&summary));
+    rows.push(("file size", output::bytes(file_bytes)));
+    verbosity.print(&Report { counts: summary, file_bytes }, &rows)
 }

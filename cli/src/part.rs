@@ -3,7 +3,7 @@
 use super::build::{BuildOptions, Way};
 use super::files;
 use super::output::{self, Verbosity};
-use super::parts::{Folder, PLAN};
+use super::parts::{Folder, PLAN, PlanFile};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -29,9 +29,8 @@ pub struct Arguments {
 #[derive(Serialize)]
 struct Report {
     folder: String,
-    parts: u32,
-    levels: Vec<u32>,
-    tetrahedra: u64,
+    #[serde(flatten)]
+    plan: PlanFile,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -62,18 +61,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata);
         files::fill_folder(output, Path::new(PLAN), part).with_context(|| options.name())?
     };
-    let report = Report {
-        folder: output.display().to_string(),
-        parts: plan.parts(),
-        levels: plan.levels(),
-        tetrahedra: plan.counts()[1],
-    };
-    let levels: Vec<String> = report.levels.iter().map(u32::to_string).collect();
+    let report = Report { folder: output.display().to_string(), plan: PlanFile::of(&plan) };
+    let levels: Vec<String> = report.plan.levels.iter().map(u32::to_string).collect();
     verbosity.print(
         &report,
         &[
             ("folder", report.folder.clone()),
-            ("tetrahedra", output::count(report.tetrahedra)),
+            ("tetrahedra", output::count(report.plan.tetrahedra)),
             ("parts", levels.join(", then ")),
         ],
     )

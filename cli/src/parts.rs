@@ -45,12 +45,19 @@ pub struct Folder<'a>(pub &'a Path);
 
 /// What [`PLAN`] says, for programs that plan the steps.
 #[derive(Serialize)]
-struct PlanFile {
-    parts: u32,
+pub struct PlanFile {
+    pub parts: u32,
     /// How many files each level has: `built-L-K.part`. Eight of one level make one of the next.
-    levels: Vec<u32>,
-    tetrahedra: u64,
+    pub levels: Vec<u32>,
+    pub tetrahedra: u64,
     vertices: u64,
+}
+
+impl PlanFile {
+    pub fn of(plan: &Plan) -> Self {
+        let [vertices, tetrahedra] = plan.counts();
+        Self { parts: plan.parts(), levels: plan.levels(), tetrahedra, vertices }
+    }
 }
 
 impl Folder<'_> {
@@ -114,8 +121,7 @@ impl Folder<'_> {
     }
 
     fn keep_plan(&self, plan: &Plan) -> Result<()> {
-        let [vertices, tetrahedra] = plan.counts();
-        let file = PlanFile { parts: plan.parts(), levels: plan.levels(), tetrahedra, vertices };
+        let file = PlanFile::of(plan);
         // Last: with it the parts are complete.
         files::write_file(&self.0.join(PLAN), |out| Ok(serde_json::to_writer_pretty(out, &file)?))
     }

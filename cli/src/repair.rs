@@ -3,7 +3,7 @@
 use super::build::named;
 use anyhow::{Context, Result};
 use serde::Serialize;
-use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, findings};
+use tetralod::mesh::{MeshFindings, RepairLevel, RepairReport, TetMesh, findings};
 
 /// How the input is mended.
 #[derive(clap::Args)]
@@ -42,21 +42,12 @@ impl RepairOptions {
 pub struct Repair {
     level: &'static str,
     weld_distance: f64,
-    merged_points: usize,
-    welded_points: usize,
-    differing_values: usize,
-    collapsed_tetrahedra: usize,
-    duplicate_tetrahedra: usize,
-    turned_tetrahedra: usize,
-    flat_tetrahedra: usize,
-    unused_points: usize,
+    #[serde(flatten)]
+    done: RepairReport,
     /// What was found and kept, in words.
     pub kept: String,
-    components: usize,
-    non_manifold_edges: usize,
-    non_manifold_vertices: usize,
-    open_seam_faces: usize,
-    weldable_faces: usize,
+    #[serde(flatten)]
+    found: MeshFindings,
 }
 
 impl Repair {
@@ -66,23 +57,7 @@ impl Repair {
             return Ok(None);
         }
         let found = findings(mesh, level.weld_distance())?;
-        Ok(Some(Self {
-            level: level.name(),
-            weld_distance: level.weld_distance(),
-            merged_points: done.merged_points,
-            welded_points: done.welded_points,
-            differing_values: done.differing_values,
-            collapsed_tetrahedra: done.collapsed_tets,
-            duplicate_tetrahedra: done.duplicate_tets,
-            turned_tetrahedra: done.turned_tets,
-            flat_tetrahedra: done.flat_tets,
-            unused_points: done.unused_points,
-            kept: found.to_string(),
-            components: found.components,
-            non_manifold_edges: found.non_manifold_edges,
-            non_manifold_vertices: found.non_manifold_vertices,
-            open_seam_faces: found.open_seam_faces,
-            weldable_faces: found.weldable_faces,
-        }))
+        let (level, weld_distance) = (level.name(), level.weld_distance());
+        Ok(Some(Self { level, weld_distance, done: *done, kept: found.to_string(), found }))
     }
 }

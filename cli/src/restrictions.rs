@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MultiTessellation};
-use tetralod_build::measure::CellAngles;
+use tetralod_build::measure::{CellAngles, CellsBelow};
 
 /// Heading in the help of these options.
 const KEEP: &str = "What must stay";
@@ -78,67 +78,40 @@ fn places(path: &Path, text: &str) -> Result<Vec<[f64; 3]>> {
 /// The smallest dihedral angles of the cells before and after.
 #[derive(Serialize)]
 pub struct Angles {
-    reference: AnglesOfMesh,
-    base: Option<AnglesOfMesh>,
-}
-
-/// Those of a mesh.
-#[derive(Serialize)]
-pub struct AnglesOfMesh {
-    /// In degrees.
-    least: Option<f64>,
-    /// Cells with an angle below so many degrees.
-    below: Vec<Below>,
-    #[serde(skip)]
-    cells: u64,
-}
-
-#[derive(Serialize)]
-struct Below {
-    degrees: f64,
-    cells: u64,
+    reference: CellAngles,
+    base: Option<CellAngles>,
 }
 
 impl Angles {
     /// Of the mesh that is built on.
     pub fn of_reference(mesh: &TetMesh) -> Self {
         let cells = mesh.tets.iter().map(|tet| tet.map(|v| mesh.positions[v as usize]));
-        Self { reference: AnglesOfMesh::of(cells), base: None }
+        Self { reference: CellAngles::of(cells), base: None }
     }
 
     /// Adds those of the base mesh.
     pub fn add_base(&mut self, mt: &Mt) {
         let (base, lattice) = (mt.base(), mt.info().lattice);
         let at = |v: u32| lattice.point(base.positions[v as usize]);
-        self.base = Some(AnglesOfMesh::of(base.tets.iter().map(|tet| tet.map(at))));
+        self.base = Some(CellAngles::of(base.tets.iter().map(|tet| tet.map(at))));
     }
 
     /// The same for people.
     pub fn rows(&self) -> impl Iterator<Item = (&'static str, String)> {
-        let base = self.base.as_ref().map(|base| ("  base mesh", base.sentence()));
-        [("smallest angles", self.reference.sentence())].into_iter().chain(base)
+        let base = self.base.as_ref().map(|base| ("  base mesh", sentence(base)));
+        [("smallest angles", sentence(&self.reference))].into_iter().chain(base)
     }
 }
 
-impl AnglesOfMesh {
-    /// Of cells with these corners.
-    pub fn of(cells: impl Iterator<Item = [[f64; 3]; 4]>) -> Self {
-        let CellAngles { least, cells, below } = CellAngles::of(cells);
-        let below =
-            CellAngles::DEGREES.into_iter().zip(below).map(|(degrees, cells)| Below { degrees, cells });
-        Self { least, below: below.collect(), cells }
-    }
-
-    /// The same for people.
-    pub fn sentence(&self) -> String {
-        let part = |Below { degrees, cells }: &Below| {
-            let share = output::percent(*cells as f64 / self.cells.max(1) as f64);
-            format!("{share} below {degrees}°")
-        };
-        let parts: Vec<String> = self.below.iter().map(part).collect();
-        let least = self.least.map_or_else(|| "-".to_owned(), |least| format!("{least:.2}°"));
-        format!("{least} at least; {}", parts.join(", "))
-    }
+/// The angles of a mesh for people.
+fn sentence(angles: &CellAngles) -> String {
+    let part = |CellsBelow { degrees, cells }: &CellsBelow| {
+        let share = output::percent(*cells as f64 / angles.cells.max(1) as f64);
+        format!("{share} below {degrees}°")
+    };
+    let parts: Vec<String> = angles.below.iter().map(part).collect();
+    let least = angles.least.map_or_else(|| "-".to_owned(), |least| format!("{least:.2}°"));
+    format!("{least} at least; {}", parts.join(", "))
 }
 
 #[cfg(test)]

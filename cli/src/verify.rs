@@ -35,9 +35,8 @@ pub struct Arguments {
 
 #[derive(Serialize)]
 struct Report<'a> {
-    valid: bool,
-    queries: u32,
-    worst_error_ratio: f64,
+    #[serde(flatten)]
+    found: &'a VerifyReport,
     /// Whether only a sample was checked.
     quick: bool,
     /// About what it took.
@@ -46,7 +45,6 @@ struct Report<'a> {
     /// What was read of the file, all requests together.
     #[serde(skip_serializing_if = "Option::is_none")]
     bytes_read: Option<u64>,
-    failures: &'a [String],
 }
 
 /// Shorter runs print no progress.
@@ -158,6 +156,6 @@ fn print(arguments: &Arguments, report: &VerifyReport, took: Took) -> Result<()>
     rows.extend(memory_bytes.map(|bytes| ("memory", format!("about {}", output::bytes(bytes)))));
     rows.extend(bytes_read.map(|bytes| ("read", format!("{} of the file", output::bytes(bytes)))));
     rows.extend(failures.iter().map(|failure| ("broken", failure.clone())));
-    let report = Report { valid, queries, worst_error_ratio, quick, memory_bytes, bytes_read, failures };
+    let report = Report { found: report, quick, memory_bytes, bytes_read };
     output::result(json, &report, &rows)
 }

@@ -2,20 +2,16 @@
 //!
 //! A symbol comes out of an alphabet in a *context*; each context has a table of how often each of its symbols occurs in
 //! the whole file, in units of 2^-12. The tables are in the file (section `MODL`), so that every coded section can be read
-//! by itself. Symbols are coded by asymmetric numeral systems (Duda 2013; the coder is that of the crate `constriction`),
+//! by itself. Symbols are coded by an asymmetric numeral system (Duda 2013: `Stack` and `Unstack`),
 //! the bits that no table can foretell stand beside them as they are.
 //!
 //! What is written is described once, to a [`Put`]: at first to [`Counts`], which makes the tables, then to a [`Writer`].
 
 use super::read::Reader;
 use super::{FormatError, write};
-use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
-use constriction::stream::stack::SmallAnsCoder;
-use constriction::stream::{Code, Decode, Encode};
-use std::num::NonZeroU16;
 
 /// Bits of a probability.
-const PRECISION: usize = 12;
+const PRECISION: u32 = 12;
 /// What the counts of a context add up to.
 const WHOLE: u32 = 1 << PRECISION;
 
@@ -186,35 +182,109 @@ impl Table {
         if self.symbols.len() == 1 { Some(u32::from(self.symbols[0])) } else { None }
     }
 
-    fn share(&self, at: usize) -> NonZeroU16 {
-        // Shares are never zero.
-        NonZeroU16::new(self.starts[at + 1].wrapping_sub(self.starts[at])).unwrap_or(NonZeroU16::MIN)
-    }
-}
-
-impl EntropyModel<PRECISION> for &Table {
-    type Symbol = u16;
-    type Probability = u16;
-}
-
-impl DecoderModel<PRECISION> for &Table {
+    /// The share of a symbol by its place.
     #[inline]
-    fn quantile_function(&self, quantile: u16) -> (u16, u16, NonZeroU16) {
-        let mut at = usize::from(self.guides[(usize::from(quantile) * GUIDES) >> PRECISION]);
-        while self.starts[at + 1] <= quantile {
+    fn share(&self, at: usize) -> Share {
+        let [start, end] = [self.starts[at], self.starts[at + 1]].map(u32::from);
+        Share { start, size: end - start }
+    }
+
+    /// The share of a symbol; none of one that does not occur.
+    fn share_of(&self, symbol: u16) -> Option<Share> {
+        self.symbols.binary_search(&symbol).ok().map(|at| self.share(at))
+    }
+
+    /// The place of the symbol whose share this part of the whole belongs to.
+    #[inline]
+    fn at(&self, part: u32) -> usize {
+        let mut at = usize::from(self.guides[(part as usize * GUIDES) >> PRECISION]);
+        while u32::from(self.starts[at + 1]) <= part {
             at += 1;
         }
-        (self.symbols[at], self.starts[at], self.share(at))
+        at
     }
 }
 
-impl EncoderModel<PRECISION> for &Table {
-    fn left_cumulative_and_probability(
-        &self,
-        symbol: impl std::borrow::Borrow<u16>,
-    ) -> Option<(u16, NonZeroU16)> {
-        let at = self.symbols.binary_search(symbol.borrow()).ok()?;
-        Some((self.starts[at], self.share(at)))
+/// The part of the whole that a symbol has: never nothing, and never all, since a sole symbol is not coded.
+#[derive(Clone, Copy)]
+struct Share {
+    start: u32,
+    size: u32,
+}
+
+/// Bits of a word of coded symbols.
+const WORD: u32 = 16;
+
+/// Symbols to words. It is a stack: what is to come out first goes in last.
+#[derive(Default)]
+struct Stack {
+    state: u32,
+    words: Vec<u16>,
+}
+
+impl Stack {
+    fn push(&mut self, share: Share) {
+        // Else the state would not fit into 32 bits.
+        if self.state >> (u32::BITS - PRECISION) >= share.size {
+            self.words.push(self.state as u16);
+            self.state >>= WORD;
+        }
+        self.state = (self.state / share.size) << PRECISION | (share.start + self.state % share.size);
+    }
+
+    /// All words, the last one not zero.
+    fn finish(mut self) -> Vec<u16> {
+        while self.state > 0 {
+            self.words.push(self.state as u16);
+            self.state >>= WORD;
+        }
+        self.words
+    }
+}
+
+/// Words to symbols, the inverse of [`Stack`]. The state is below 2^16 only where no words are left.
+struct Unstack<'a> {
+    state: u32,
+    /// Those that are left, of two bytes each.
+    words: &'a [u8],
+}
+
+impl<'a> Unstack<'a> {
+    /// None if the last word is zero, which [`Stack::finish`] does not leave.
+    fn new(words: &'a [u8]) -> Option<Self> {
+        let mut coder = Self { state: 0, words };
+        coder.fill();
+        if coder.state == 0 && !words.is_empty() {
+            return None;
+        }
+        coder.fill();
+        Some(coder)
+    }
+
+    /// Takes a word into the state, if there is one.
+    #[inline]
+    fn fill(&mut self) {
+        if let Some((words, word)) = self.words.split_last_chunk() {
+            self.state = self.state << WORD | u32::from(u16::from_le_bytes(*word));
+            self.words = words;
+        }
+    }
+
+    /// The place of the next symbol in its table.
+    #[inline]
+    fn pop(&mut self, table: &Table) -> usize {
+        let part = self.state & (WHOLE - 1);
+        let at = table.at(part);
+        let share = table.share(at);
+        self.state = (self.state >> PRECISION) * share.size + part - share.start;
+        if self.state >> WORD == 0 {
+            self.fill();
+        }
+        at
+    }
+
+    fn is_at_end(&self) -> bool {
+        self.state == 0 && self.words.is_empty()
     }
 }
 
@@ -245,7 +315,7 @@ impl Models {
                 bits.gamma(u32::from(symbol) - next);
                 next = u32::from(symbol) + 1;
                 if at + 1 < table.symbols.len() {
-                    bits.gamma(u32::from(table.share(at).get()) - 1);
+                    bits.gamma(table.share(at).size - 1);
                 }
             }
         }
@@ -318,9 +388,8 @@ impl<'a> Measure<'a> {
 impl Put for Measure<'_> {
     fn symbol(&mut self, family: Family, which: u32, symbol: u32) {
         self.last = family.context(which);
-        let share = (&self.models.0[self.last]).left_cumulative_and_probability(symbol as u16);
-        let share = share.map_or(WHOLE as f64, |(_, share)| f64::from(share.get()));
-        self.costs[self.last] += (f64::from(WHOLE) / share).log2();
+        let share = self.models.0[self.last].share_of(symbol as u16).map_or(WHOLE, |share| share.size);
+        self.costs[self.last] += (f64::from(WHOLE) / f64::from(share)).log2();
     }
 
     fn bits(&mut self, _: u32, width: u32) {
@@ -355,16 +424,16 @@ impl<'a> Writer<'a> {
 
     /// Appends all that was put.
     pub fn finish(self, out: &mut Vec<u8>) {
-        let mut coder = SmallAnsCoder::new();
-        // The coder is a stack: what is to come out first goes in last.
+        let mut coder = Stack::default();
         for &(context, symbol) in self.symbols.iter().rev() {
             let table = &self.models.0[context as usize];
             if table.sole_symbol().is_none() {
-                let coded = coder.encode_symbol(symbol, table);
-                debug_assert!(coded.is_ok(), "the tables were made from these symbols");
+                let share = table.share_of(symbol);
+                debug_assert!(share.is_some(), "the tables were made from these symbols");
+                share.into_iter().for_each(|share| coder.push(share));
             }
         }
-        let Ok(words) = coder.into_compressed();
+        let words = coder.finish();
         write::varint(out, words.len() as u64);
         words.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
         out.extend_from_slice(&self.bits.finish());
@@ -374,7 +443,7 @@ impl<'a> Writer<'a> {
 /// Reads a coded section: the varint of how many 16-bit words there are, these words, then the plain bits.
 pub struct Source<'a> {
     models: &'a Models,
-    coder: SmallAnsCoder,
+    coder: Unstack<'a>,
     bits: BitReader<'a>,
     reader: Reader<'a>,
 }
@@ -382,10 +451,8 @@ pub struct Source<'a> {
 impl<'a> Source<'a> {
     pub fn new(mut reader: Reader<'a>, models: &'a Models) -> Result<Self, FormatError> {
         let count = reader.varint()?;
-        let bytes = reader.bytes(count as usize, 2)?;
-        let words = bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
-        let coder = SmallAnsCoder::from_compressed(words)
-            .map_err(|_| reader.corrupt("coded symbols end with a zero"))?;
+        let words = reader.bytes(count as usize, 2)?;
+        let coder = Unstack::new(words).ok_or_else(|| reader.corrupt("coded symbols end with a zero"))?;
         let bits = BitReader::new(reader.rest());
         Ok(Self { models, coder, bits, reader })
     }
@@ -405,10 +472,7 @@ impl<'a> Source<'a> {
         if let Some(only) = table.sole_symbol() {
             return Ok(only);
         }
-        match self.coder.decode_symbol(table) {
-            Ok(symbol) => Ok(u32::from(symbol)),
-            Err(_) => Err(self.corrupt("a coded symbol is damaged")),
-        }
+        Ok(u32::from(table.symbols[self.coder.pop(table)]))
     }
 
     /// The next `width` bits, at most 32.
@@ -447,7 +511,7 @@ impl<'a> Source<'a> {
 
     /// Everything must have been read.
     pub fn end(self) -> Result<(), FormatError> {
-        if self.coder.state() == 0 && self.coder.bulk().is_empty() && self.bits.is_at_end() {
+        if self.coder.is_at_end() && self.bits.is_at_end() {
             Ok(())
         } else {
             Err(self.corrupt("something is left over in a coded section"))
@@ -626,6 +690,81 @@ mod tests {
             assert!(Models::read(Reader::new(&tables[..cut], 0), &FAMILIES).is_err());
         }
         Ok(())
+    }
+
+    /// The bytes that the first files of this format were written with.
+    #[test]
+    fn bytes_stay_what_they_are() {
+        let symbols = [0, 1, 1, 2, 1, 0, 1, 1, 1, 4, 1, 0];
+        let words: [&[u8]; 13] = [
+            &[0],
+            &[0],
+            &[1, 0x00, 0x10],
+            &[1, 0x00, 0x20],
+            &[1, 0x54, 0xA1],
+            &[2, 0xA1, 0xD2, 0x02, 0x00],
+            &[2, 0xA1, 0xD2, 0x02, 0x00],
+            &[2, 0x1C, 0x51, 0x0F, 0x00],
+            &[2, 0xDE, 0x70, 0x1F, 0x00],
+            &[2, 0x4A, 0xA3, 0x2F, 0x00],
+            &[2, 0x91, 0x52, 0x10, 0x01],
+            &[2, 0xDB, 0xA0, 0x9C, 0x04],
+            &[2, 0xDB, 0xA0, 0x9C, 0x04],
+        ];
+        let put_all = |out: &mut dyn FnMut(u32), count: usize| symbols[..count].iter().for_each(|&s| out(s));
+        let mut counts = Counts::default();
+        put_all(&mut |symbol| counts.symbol(SMALL, 0, symbol), symbols.len());
+        let models = Models::new(&counts);
+        let mut tables = Vec::new();
+        models.write(&mut tables);
+        assert_eq!(tables, [0x01, 0x2C, 0x00, 0x01, 0x08, 0x80, 0x56, 0x09, 0xB0, 0x4A]);
+        for (count, expected) in words.iter().enumerate() {
+            let mut writer = Writer::new(&models);
+            put_all(&mut |symbol| writer.symbol(SMALL, 0, symbol), count);
+            let mut bytes = Vec::new();
+            writer.finish(&mut bytes);
+            assert_eq!(bytes, *expected, "{count} symbols");
+        }
+        // Numbers, signs and bits of all sizes, by length and checksum.
+        let all = numbers();
+        let mut counts = Counts::default();
+        put(&mut counts, &all);
+        let models = Models::new(&counts);
+        let mut tables = Vec::new();
+        models.write(&mut tables);
+        assert_eq!((tables.len(), crc32fast::hash(&tables)), (507, 0xB036_05C7));
+        for (count, expected) in [
+            (1, (13, 0x1E3B_4CD5)),
+            (2, (20, 0x5A20_88C8)),
+            (7, (51, 0x3842_33BE)),
+            (100, (725, 0xA2CC_F13A)),
+            (all.len(), (21_515, 0xE331_0601)),
+        ] {
+            let mut writer = Writer::new(&models);
+            put(&mut writer, &all[..count]);
+            let mut bytes = Vec::new();
+            writer.finish(&mut bytes);
+            assert_eq!((bytes.len(), crc32fast::hash(&bytes)), expected, "{count} numbers");
+        }
+    }
+
+    /// Words that no writer makes are refused or read as symbols of the table, without a panic.
+    #[test]
+    fn any_words_give_symbols_or_errors() {
+        let mut counts = Counts::default();
+        [0, 1, 1, 4].iter().for_each(|&symbol| counts.symbol(SMALL, 0, symbol));
+        let models = Models::new(&counts);
+        for first in 0..=u16::MAX {
+            let [low, high] = first.to_le_bytes();
+            let bytes = [2, high, low, low, high];
+            let Ok(mut source) = Source::new(Reader::new(&bytes, 0), &models) else {
+                assert_eq!(first, 0, "only a last word of zero is refused");
+                continue;
+            };
+            for _ in 0..20 {
+                assert!(matches!(source.symbol(SMALL, 0), Ok(0 | 1 | 4)));
+            }
+        }
     }
 
     #[test]

@@ -411,8 +411,6 @@ impl Camera {
     }
 
     /// From model space to clip space (depth 0 to 1).
-    // One copy for all who project points: it is large in wasm.
-    #[inline(never)]
     pub fn view_projection(&self, aspect: f64) -> DMat4 {
         let [near, far] = self.clip();
         let projection = match self.projection {
@@ -426,7 +424,6 @@ impl Camera {
     }
 
     /// The normalised screen point of `p`; `None` if it lies behind a perspective camera.
-    #[inline(never)]
     pub fn project(&self, p: DVec3, aspect: f64) -> Option<DVec2> {
         let clip = self.view_projection(aspect) * p.extend(1.0);
         (clip.w > 0.0).then(|| DVec2::new(clip.x, clip.y) / clip.w)

@@ -10,7 +10,7 @@ pub const MAX_TETS: usize = (1 << 30) - 1;
 
 /// One side of a face: the face of one tetrahedron. A number, for sorting: the face's vertices in increasing order, and
 /// `4 · tet + i` for face `i`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[doc(hidden)]
 pub struct HalfFace(u128);
 
@@ -111,15 +111,11 @@ impl<'a> FaceTable<'a> {
     /// The first one of `see`.
     pub fn each_group<E>(&self, mut see: impl FnMut(&[HalfFace]) -> Result<(), E>) -> Result<(), E> {
         let mut bucket: Vec<HalfFace> = Vec::new();
-        // As numbers: sorting another type would add much to the wasm.
-        let mut numbers: Vec<u128> = Vec::new();
         for ends in self.starts.windows(2) {
             let codes = &self.codes[ends[0] as usize..ends[1] as usize];
-            numbers.clear();
-            numbers.extend(codes.iter().map(|&code| HalfFace::of(self.tets, code).0));
-            numbers.sort_unstable();
             bucket.clear();
-            bucket.extend(numbers.iter().copied().map(HalfFace));
+            bucket.extend(codes.iter().map(|&code| HalfFace::of(self.tets, code)));
+            bucket.sort_unstable();
             bucket.chunk_by(|a, b| a.0 >> 32 == b.0 >> 32).try_for_each(&mut see)?;
         }
         Ok(())

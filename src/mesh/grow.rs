@@ -4,7 +4,7 @@
 use super::FACES;
 use super::NONE;
 use super::neighbors;
-use crate::geom::{orient3d, sort_few, total_order};
+use crate::geom::orient3d;
 use glam::DVec3;
 
 /// Most faces around a vertex that are looked at.
@@ -136,9 +136,7 @@ impl Growth {
         for [u, v, w] in [[a, b, c], [b, c, a], [c, a, b]] {
             self.look_across(&mut gate, [u, v, w]);
         }
-        sort_few(&mut gate.candidates[..gate.count], |a, b| {
-            b.faces.cmp(&a.faces).then(a.angle.total_cmp(&b.angle)).is_lt()
-        });
+        gate.candidates[..gate.count].sort_by(|a, b| b.faces.cmp(&a.faces).then(a.angle.total_cmp(&b.angle)));
         Some(gate)
     }
 
@@ -193,16 +191,15 @@ impl Growth {
         found.dedup();
         let [a, b, c] = gate.face.map(|v| self.positions[v as usize]);
         let candidates = gate.candidates();
-        let mut ranked: Vec<u128> = Vec::new();
+        let mut ranked: Vec<(f64, u32)> = Vec::new();
         for v in found {
             let p = self.positions[v as usize];
             if candidates.iter().all(|known| known.vertex != v) && orient3d(a, b, c, p) > 0 {
-                let reach = total_order(reach([a, b, c], p));
-                ranked.push(u128::from(reach) << 32 | u128::from(v));
+                ranked.push((reach([a, b, c], p), v));
             }
         }
-        ranked.sort_unstable();
-        ranked.into_iter().map(|key| key as u32).collect()
+        ranked.sort_unstable_by(|(near, v), (far, w)| near.total_cmp(far).then(v.cmp(w)));
+        ranked.into_iter().map(|(_, v)| v).collect()
     }
 
     /// Marks the gate as a face of the boundary.

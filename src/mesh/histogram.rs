@@ -2,7 +2,6 @@
 //!
 //! Sums are compensated (Neumaier 1974): they do not depend on how many terms there are.
 
-use crate::geom::sort_few;
 use glam::DVec3;
 
 /// A compensated sum.
@@ -50,7 +49,7 @@ impl Histogram {
     pub fn add(&mut self, corners: [[f64; 3]; 4], values: [f64; 4]) {
         let volume = volume_of(corners);
         let mut sorted = values;
-        sort_few(&mut sorted, |a, b| a.total_cmp(b).is_lt());
+        sorted.sort_unstable_by(f64::total_cmp);
         let [min, _, _, max] = sorted;
         let upto = |x: f64| volume * fraction_below(sorted, x);
         // All below the upper end counts: what is at the end has a volume only if all of it is there.

@@ -1,6 +1,7 @@
 //! A tetrahedral mesh as files give it and builders take it.
 
 use crate::mesh::MeshInput;
+use serde::Serialize;
 
 /// A scalar field with one value per point (or per tetrahedron), and what is known of it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,11 +34,12 @@ impl Field {
 }
 
 /// Which part of a vector or tensor a scalar field is.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct VectorPart {
     /// The vector's name.
     pub name: String,
     /// The component, from 0; none for the vector's length, which follows from the components.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<u8>,
 }
 

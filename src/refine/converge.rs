@@ -3,8 +3,8 @@
 use super::front::{Front, GoOn, Task, Violation};
 use super::look::{Open, TetErrors};
 use super::{TetData, Verdict};
-use crate::geom::sort_few;
 use crate::mt::{Applied, ApplyUpdates, CurrentMesh, MAX_QUARTERINGS, UpdateError, UpdateId};
+use std::cmp::Reverse;
 
 /// The result of forcing an update.
 pub(super) enum Forced {
@@ -26,9 +26,6 @@ pub(super) enum Way {
 
 /// Tetrahedra that are evaluated together.
 const AT_ONCE: usize = 64;
-
-/// So many violations are sorted where they are.
-const FEW: usize = 16;
 
 /// With a violation of so much slack, the search for a longer one ends.
 const LONG: f64 = 1.0 / 16.0;
@@ -124,14 +121,7 @@ impl Front {
 
     /// Sorts what is pending by falling number of the update.
     fn sort_pending(&mut self) {
-        if self.pending.len() <= FEW {
-            return sort_few(&mut self.pending, |a, b| a.update > b.update);
-        }
-        let key = |violation: &Violation| u64::from(!violation.update.0) << 32;
-        let mut order: Vec<u64> =
-            (0..).zip(&self.pending).map(|(place, violation)| key(violation) | place).collect();
-        order.sort_unstable();
-        self.pending = order.iter().map(|key| self.pending[*key as u32 as usize]).collect();
+        self.pending.sort_by_key(|violation| Reverse(violation.update));
     }
 
     /// Evaluates all due tetrahedra in groups: fetching the data of a group first hides memory latency.

@@ -7,7 +7,7 @@
 use super::Session;
 use super::pieces::Pieces;
 use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
-use crate::geom::{Bounds, total_order};
+use crate::geom::Bounds;
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetData};
 use std::borrow::Cow;
@@ -339,11 +339,7 @@ impl Session {
         };
         plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
         // What a block depends on is as important and has a smaller number.
-        let key =
-            |&(priority, block): &(f64, u32)| u128::from(!total_order(priority)) << 32 | u128::from(block);
-        let mut order: Vec<u128> = (0..).zip(&plan).map(|(place, entry)| key(entry) << 32 | place).collect();
-        order.sort_unstable();
-        plan = order.into_iter().map(|key| plan[key as u32 as usize]).collect();
+        plan.sort_by(|(priority, block), (other, after)| other.total_cmp(priority).then(block.cmp(after)));
         blocks.needed = plan.len() as u32;
         // Pages with applied updates do not go: what comes has to fit beside them.
         let mut taken = match &self.front {

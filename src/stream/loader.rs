@@ -338,12 +338,9 @@ impl Loader {
 
     /// Says of more ranges that a cache has them: those that are wanted are read from there.
     pub fn add_cached(&mut self, ranges: &[Range<u64>]) {
-        // As numbers: sorting ranges would add much to the wasm.
-        let key = |range: &Range<u64>| u128::from(range.start) << 64 | u128::from(range.end);
-        let mut keys: Vec<u128> = self.cached.iter().chain(ranges).map(key).collect();
-        keys.sort_unstable();
-        keys.dedup();
-        self.cached = keys.into_iter().map(|key| (key >> 64) as u64..key as u64).collect();
+        self.cached.extend_from_slice(ranges);
+        self.cached.sort_unstable_by_key(|range| (range.start, range.end));
+        self.cached.dedup();
     }
 
     /// There is no cache any more.

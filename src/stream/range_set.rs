@@ -9,29 +9,18 @@ pub struct RangeSet {
 }
 
 impl RangeSet {
-    /// The union of `ranges`, in any order: goes over their starts and ends, counting how many are open.
-    ///
-    /// Starts and ends are sorted each for themselves, as plain numbers: sorting ranges would add much to the wasm.
+    /// The union of `ranges`, in any order.
     pub fn of(mut ranges: Vec<Range<u64>>) -> Self {
         ranges.retain(|range| range.start < range.end);
-        let mut starts: Vec<u64> = ranges.iter().map(|range| range.start).collect();
-        let mut ends: Vec<u64> = ranges.iter().map(|range| range.end).collect();
-        starts.sort_unstable();
-        ends.sort_unstable();
-        ranges.clear();
-        let (mut from, mut closed) = (0, 0);
-        for (opened, start) in starts.iter().enumerate() {
-            while ends[closed] < *start {
-                closed += 1;
-                if closed == opened {
-                    ranges.push(from..ends[closed - 1]);
-                }
+        ranges.sort_unstable_by_key(|range| range.start);
+        // Each is taken into the one before, as far as that has come, if they touch.
+        ranges.dedup_by(|next, last| {
+            let touches = next.start <= last.end;
+            if touches {
+                last.end = last.end.max(next.end);
             }
-            if closed == opened {
-                from = *start;
-            }
-        }
-        ranges.extend(ends.last().map(|end| from..*end));
+            touches
+        });
         Self { ranges }
     }
 

@@ -8,7 +8,7 @@
 //! number is taken. Points that are computed to be on a face of the boundary are beside it by what rounding does: one that is outside by no more
 //! than [`ROUNDING`] is found in the nearest tetrahedron, at its border. What is further outside is not found.
 
-use crate::geom::{Bounds, Groups, sort_few, total_order};
+use crate::geom::{Bounds, Groups};
 use crate::mesh::{FACES, NONE};
 use crate::view::MeshView;
 use glam::DVec3;
@@ -341,15 +341,8 @@ impl<'a> Probe<'a> {
 }
 
 /// Sorts the parts of a segment, each from where to where in which tetrahedron, by these.
-fn sort_parts(parts: &mut Vec<(f64, f64, u32)>) {
-    let key = |from: f64| u128::from(total_order(from)) << 64;
-    let mut order: Vec<u128> = (0..).zip(&*parts).map(|(place, part)| key(part.0) | place).collect();
-    order.sort_unstable();
-    *parts = order.into_iter().map(|key| parts[key as usize]).collect();
-    // Those that begin at the same place are around one vertex.
-    for same in parts.chunk_by_mut(|a, b| a.0.total_cmp(&b.0).is_eq()) {
-        sort_few(same, |a, b| a.1.total_cmp(&b.1).then(a.2.cmp(&b.2)).is_lt());
-    }
+fn sort_parts(parts: &mut [(f64, f64, u32)]) {
+    parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
 }
 
 /// Six times the volume of a tetrahedron, with the exact sign.
@@ -547,7 +540,7 @@ impl Grid {
             if (d[i] * self.scale[i]).abs() > (d[long] * self.scale[long]).abs() { i } else { long }
         });
         let mut ends = [from[long], to[long]];
-        sort_few(&mut ends, |a, b| a.total_cmp(b).is_lt());
+        ends.sort_unstable_by(f64::total_cmp);
         if ends[1] < self.min[long] || ends[0] > self.max[long] {
             return found;
         }
@@ -561,7 +554,7 @@ impl Grid {
             let s = if d[long] == 0.0 { [0.0, 1.0] } else { s };
             let range = [0, 1, 2].map(|i| {
                 let mut x = s.map(|s| from[i] + s * d[i]);
-                sort_few(&mut x, |a, b| a.total_cmp(b).is_lt());
+                x.sort_unstable_by(f64::total_cmp);
                 let slack = 1e-12 * (from[i].abs() + to[i].abs());
                 if i == long {
                     [layer, layer]

@@ -1,9 +1,6 @@
 //! Ticks of axes and colour bars: round numbers in a range, with labels.
 //!
-//! Ticks are made as decimal numbers, an integer times a power of ten. So their labels are exact, and are
-//! written without the formatting of floating-point numbers, which is large in wasm.
-
-use std::fmt::Write;
+//! Ticks are made as decimal numbers, an integer times a power of ten, so that their labels are exact.
 
 /// More ticks than these are never made.
 const MOST_TICKS: usize = 1000;
@@ -237,28 +234,21 @@ impl Decimal {
             return "0".into();
         }
         let magnitude = self.magnitude();
-        let mut text = fixed(self.digits, self.exponent - magnitude);
-        // Writing to a string does not fail.
-        let _ = write!(text, "e{magnitude}");
-        text
+        format!("{}e{magnitude}", fixed(self.digits, self.exponent - magnitude))
     }
 }
 
 /// `digits * 10^exponent` without an exponent.
 fn fixed(digits: i64, exponent: i32) -> String {
-    let sign = if digits < 0 { "-" } else { "" };
-    let mut text = digits.unsigned_abs().to_string();
+    let places = exponent.unsigned_abs() as usize;
     if exponent >= 0 {
-        if digits != 0 {
-            text.extend(std::iter::repeat_n('0', exponent as usize));
-        }
-        return format!("{sign}{text}");
+        let zeros = if digits == 0 { 0 } else { places };
+        return format!("{digits}{}", "0".repeat(zeros));
     }
-    let decimals = exponent.unsigned_abs() as usize;
-    let missing = (decimals + 1).saturating_sub(text.len());
-    text.insert_str(0, &"0".repeat(missing));
-    text.insert(text.len() - decimals, '.');
-    format!("{sign}{text}")
+    let sign = if digits < 0 { "-" } else { "" };
+    let text = format!("{:0width$}", digits.unsigned_abs(), width = places + 1);
+    let (whole, decimals) = text.split_at(text.len() - places);
+    format!("{sign}{whole}.{decimals}")
 }
 
 /// `x * 10^exponent`; correctly rounded for integers of up to 15 digits and exponents within 22 of zero.

@@ -44,8 +44,7 @@ VTK's quadrics add squares of distances and of differences of the field, and its
 of at most 1, and the field to a range of 1. A set ends where VTK is stuck more than a tenth above what it was asked for.
 
 Both are measured by the same program (`benches/quality`) at all vertices of the input, outside and inside, in % of the field's range: *max*,
-the largest difference of the field, and *RMS*, the root of the mean square; *fitted*: those of the same mesh with values that fit the input
-(`extract --fit`), which the bound is not of. A vertex in several cells counts with the best of them; one
+the largest difference of the field, and *RMS*, the root of the mean square. A vertex in several cells counts with the best of them; one
 in none is compared with the nearest place of the mesh's boundary. *bound*: what tetralod promises of the mesh, of the displacement of the boundary
 as well, for *some* place within that displacement: where the boundary has moved (`fea_kiefer`), the difference at the nearest place
 may be larger. VTK's meshes come without such a promise. *outside*: how many vertices are farther from the mesh than 0.002 % of the diagonal. *turned*: cells
@@ -54,10 +53,10 @@ tetrahedra than VTK's, it is the base mesh, which is the coarsest one.
 
 Where tetralod has the higher RMS, it is mostly at few tetrahedra: it chooses by the largest error and has the input's values
 at the vertices that it keeps, so that linear interpolants lie on one side of a field that is bent, while VTK places vertices, and values, so that the
-sum of squares is small, and lets the largest error and the boundary go. Other values at the same vertices are what helps: with those of the
-least sum of cubes, which `extract --fit` writes, RMS is 9 to 34 % less from 20 % of the tetrahedra down (`piezo_micro`: 7 to 9 %, `cylinder_flow`: 5 to 27 %). Those of the least sum of squares have a little
+sum of squares is small, and lets the largest error and the boundary go. Other values at the same vertices are what helps: in a trial, with those of the
+least sum of cubes, RMS was 9 to 34 % less from 20 % of the tetrahedra down (`piezo_micro`: 7 to 9 %, `cylinder_flow`: 5 to 27 %). Those of the least sum of squares had a little
 less still, but a larger maximum: of bucky at 5 and 2 % RMS 1.89 and 3.37 and maximum 11.7 and 21.8 instead of 1.92 and 3.44, 10.7 and 19.4.
-An MT that is built `--for mean` has, of bucky at 5 and 2 %, RMS 1.98 and 3.36 and maximum 10.9 and 18.7, fitted 1.74 and 3.04 and 10.9 and 18.8.
+An MT built by an order of removals that counts the sum of squares had, of bucky at 5 and 2 %, RMS 1.98 and 3.36 and maximum 10.9 and 18.7.
 
 The order of removals explains less. Of bucky at 5 and 2 %, RMS 2.34 and 4.30: 2.45 and 4.30 where each vertex goes
 to the neighbour of the least sum of squares within its level of error, instead of the one that leaves the fewest tetrahedra; 2.48 and 3.95, with a maximum of 16.4 and 23, where
@@ -67,7 +66,7 @@ and 7.31, of `disk_out_ref` at 5 and 2 % 1.86 and 6.30.
 
 `piece` is a thin, curved body, of which VTK moves the boundary two to three times as far at 10 and 5 %: the farthest vertices are at 0.2 and 0.69 % of the diagonal,
 those of tetralod at 0.07 and 0.3 %, since a displacement counts as an error that has to be less elsewhere. Where it counts less
-(`build --displacement 200% --displacement-edges 1000`), fitted meshes have the lower maximum at all sizes (0.187, 0.447 and 1.66 at 10, 5 and 2 %; RMS 0.0478, 0.105 and 0.333), the farthest vertices being at
+(`build --displacement 200% --displacement-edges 1000`), meshes with fitted values have the lower maximum at all sizes (0.187, 0.447 and 1.66 at 10, 5 and 2 %; RMS 0.0478, 0.105 and 0.333), the farthest vertices being at
 0.3, 0.46 and 1.89 % (VTK's: 0.2, 0.69 and 2.01 %). A volume 11 % larger at 2 % is not a matter of the allowance: with a quarter of it (`--displacement 5%`) it is 11 % as well, and the farthest vertex at 1.8 %. With 262
 tetrahedra there are 125 vertices, all of the input's, for two curved sides, and a chord across a hollow fills it.
 

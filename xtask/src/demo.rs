@@ -8,7 +8,7 @@ use std::thread;
 use anyhow::{Context, Result, anyhow, bail};
 
 use crate::serve::Server;
-use crate::volumes::{self, BEFORE_PAGE, DATA, LARGE, SMALL, Volume};
+use crate::volumes::{self, BEFORE_PAGE, DATA, Volume, Volumes};
 use crate::{package, shell};
 
 /// The memory that the large volume takes to build, in KiB: some 130 bytes a tetrahedron, and its data.
@@ -32,43 +32,44 @@ pub fn run(args: &[String]) -> Result<()> {
     // Both take minutes: side by side, no core is idle.
     let viewer = thread::spawn(package::build_viewer);
     let tetralod = shell::demo_command()?;
-    let [first, rest] = [&SMALL[..BEFORE_PAGE], &SMALL[BEFORE_PAGE..]];
-    make_volumes(&tetralod, if serve { first } else { &SMALL }, 1)?;
+    let volumes = Volumes::read()?;
+    let (first, rest) = volumes.small.split_at(BEFORE_PAGE);
+    make_volumes(&tetralod, if serve { first } else { &volumes.small }, 1)?;
     viewer.join().map_err(|_| anyhow!("a thread that builds the viewer panicked"))??;
     if !serve {
-        draw_all()?;
+        draw_all(&volumes)?;
         return package::build_released();
     }
     let mut rest = rest.to_vec();
-    rest.extend((!small && has_memory()).then_some(LARGE));
-    volumes::write_list(&tetralod, &rest)?;
+    rest.extend((!small && has_memory()).then(|| volumes.large.clone()));
+    volumes.write_list(&tetralod, &rest)?;
     let made = tetralod.clone();
-    thread::spawn(move || make_rest(&made, &rest));
+    thread::spawn(move || make_rest(&made, &volumes, &rest));
     serve_page(&tetralod, port)
 }
 
 /// Makes the volumes that the page does without at first with what the machine has left, and thumbnails. An error does not end the
 /// page.
-fn make_rest(tetralod: &Path, volumes: &[Volume]) {
+fn make_rest(tetralod: &Path, volumes: &Volumes, rest: &[Volume]) {
     let prefix: &[&str] = if shell::find("nice").is_some() { &["nice", "-n", "19"] } else { &[] };
-    for (i, volume) in volumes.iter().enumerate() {
+    for (i, volume) in rest.iter().enumerate() {
         let made = volumes::make(tetralod, volume, prefix);
         // What is there is listed before the next is made, and before there are thumbnails, and also where they fail.
-        let listed = volumes::write_list(tetralod, &volumes[i + 1..]);
+        let listed = volumes.write_list(tetralod, &rest[i + 1..]);
         for error in [made, listed].into_iter().filter_map(Result::err) {
             eprintln!("a volume was not made: {error:#}");
         }
     }
-    if let Err(error) = draw_all() {
+    if let Err(error) = draw_all(volumes) {
         eprintln!("{error:#}");
     }
 }
 
 /// Draws the thumbnails of all volumes that are there.
-fn draw_all() -> Result<()> {
+fn draw_all(volumes: &Volumes) -> Result<()> {
     let tetralod = shell::tested_command()?;
-    volumes::draw_all(&tetralod);
-    volumes::write_list(&tetralod, &[])
+    volumes.draw(&tetralod);
+    volumes.write_list(&tetralod, &[])
 }
 
 /// Whether there is memory for the large volume. Where the system does not say, there is.
@@ -93,9 +94,10 @@ pub fn bench_volume() -> Result<PathBuf> {
 /// Makes the small volumes that are missing or older than the command that builds them, with thumbnails, and the list of all.
 pub fn make_data(tetralod: &Path) -> Result<()> {
     // Most of a build takes one core.
-    make_volumes(tetralod, &SMALL, 2)?;
-    volumes::draw_all(tetralod);
-    volumes::write_list(tetralod, &[])
+    let volumes = Volumes::read()?;
+    make_volumes(tetralod, &volumes.small, 2)?;
+    volumes.draw(tetralod);
+    volumes.write_list(tetralod, &[])
 }
 
 /// Makes volumes, so many at a time.
@@ -118,7 +120,7 @@ fn make_volumes(tetralod: &Path, volumes: &[Volume], at_a_time: usize) -> Result
 /// The same, and the large volume.
 pub fn make_all(tetralod: &Path) -> Result<()> {
     fs::create_dir_all(DATA)?;
-    volumes::make(tetralod, &LARGE, &[])?;
+    volumes::make(tetralod, &Volumes::read()?.large, &[])?;
     make_data(tetralod)
 }
 

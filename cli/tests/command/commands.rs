@@ -506,7 +506,7 @@ fn an_mt_is_built_for_a_purpose() {
     let [input, mt] = ["b.vti", "b.mt"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "7", "-o", &input]);
     for criterion in ["half-edge", "delaunay"] {
-        for purpose in ["uniform", "regions", "mean"] {
+        for purpose in ["uniform", "regions"] {
             let options = ["--kind", "vertex", "--criterion", criterion, "--for", purpose, "--quiet"];
             good(&[&["build", &input, "-o", &mt], &options[..]].concat());
             assert!(good(&["verify", &mt, "--against", &input]).contains("every promise is kept"));
@@ -571,7 +571,6 @@ fn failures_name_the_file_and_leave_nothing() {
     for file in [&none, &text, &mt] {
         bad(1, &["build", file, "-o", &out], &[file]);
         bad(1, &["extract", &mt, "-o", &out, "--measure", file], &[file]);
-        bad(1, &["extract", &mt, "-o", &out, "--fit", file], &[file]);
         bad(1, &["verify", &mt, "--against", file], &[file]);
     }
     bad(1, &["build", &input, "-o", &out, "--field", "nothing"], &[&input, "'nothing'", "density"]);
@@ -680,7 +679,6 @@ fn inputs_are_never_replaced() {
         #[cfg(unix)]
         &["convert", &mt, "-o", &linked, "--kind", "explicit"],
         &["extract", &mt, "-o", &mesh, "--measure", &mesh],
-        &["extract", &mt, "-o", &mesh, "--fit", &mesh],
         &["extract", &renamed, "-o", &renamed],
         &["extract", &mt, "-o", &mesh, "--measure", &list],
         &["build", &medit, "-o", &solution],
@@ -722,12 +720,8 @@ fn inputs_that_others_name_are_never_replaced() {
     {
         fs::write(&list, collection(listed)).expect("a file");
         fs::write(&pieces, grid(piece)).expect("a file");
-        for arguments in [
-            &["extract", &mt, "-o", &mesh, "--error", "5%", "--measure", &list][..],
-            &["extract", &mt, "-o", &mesh, "--fit", &list],
-        ] {
-            bad(1, arguments, &["is an input, too", "another file"]);
-        }
+        let arguments = ["extract", &mt, "-o", &mesh, "--error", "5%", "--measure", &list];
+        bad(1, &arguments, &["is an input, too", "another file"]);
         assert_eq!(fs::read(&mesh).expect("a file"), before);
     }
     // A piece of a list that is built piece by piece.
@@ -848,40 +842,7 @@ fn measuring_against_another_mesh_fails() {
         assert_eq!(output.status.code(), Some(1));
         let told = text(&output.stderr);
         assert!(told.contains("is not what the MT was built from"), "{told}");
-        bad(
-            1,
-            &["extract", &mt, "-o", &out, "--error", error, "--fit", &other],
-            &["is not what the MT was built from"],
-        );
     }
-}
-
-/// `--fit` writes other values at the same vertices, which are nearer to the input, and says how near.
-#[test]
-fn values_are_fitted_to_the_input() {
-    let folder = Folder::new("fit");
-    let [input, mt, out, fitted] = ["in.vti", "m.mt", "out.vtu", "fitted.vtu"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "13", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
-    let own = json(&["extract", &mt, "--budget", "500", "-o", &out, "--json", "--measure", &input]);
-    let report = json(&["extract", &mt, "--budget", "500", "-o", &fitted, "--json", "--fit", &input]);
-    let fit = &report["fit"];
-    assert!(own["fit"].is_null() && report["measured_error"].is_null());
-    assert_eq!(report["hash"], own["hash"], "of the mesh of the MT");
-    assert!((number(fit, "largest_before") - number(&own, "measured_error")).abs() < 1e-9, "{report}");
-    // How much less it is depends on the mesh; `cargo xtask bench --against-vtk` measures that.
-    assert!(number(fit, "root_mean_square") < 0.95 * number(fit, "root_mean_square_before"), "{report}");
-    let [a, b] = [&out, &fitted].map(|path| tetralod_io::read(Path::new(path)).expect("a mesh"));
-    assert_eq!((&a.positions, &a.tets), (&b.positions, &b.tets));
-    assert_ne!(a.fields[0].values, b.fields[0].values);
-    let told = good(&["extract", &mt, "--budget", "500", "-o", &fitted, "--fit", &input]);
-    assert!(told.contains("root mean square") && told.contains("before the fit"), "{told}");
-    bad(
-        1,
-        &["extract", &mt, "--box", "0,0,0,0.5,0.5,0.5", "--error", "1%", "-o", &fitted, "--fit", &input],
-        &["--fit", "one error everywhere"],
-    );
-    bad(2, &["extract", &mt, "-o", &fitted, "--fit", &input, "--measure", &input], &["--fit", "--measure"]);
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! Requests that change a little from frame to frame, as they do while a user moves a region or a camera.
 
 use super::timed;
+use serde::Serialize;
 use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
 use tetralod::refine::{Need, Request, View};
 use tetralod::session::{Session, SessionError};
 
 /// What a walk of requests cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Coherent {
     /// Milliseconds a frame, half of the frames took at most that.
     pub median_ms: f64,
@@ -26,9 +27,10 @@ pub struct Coherent {
 }
 
 /// The three walks.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Walks {
     /// A cube of 30 % of the domain's width, within 1 % of the field's range, that moves by 5 % of its width a frame.
+    #[serde(rename = "box")]
     pub roi: Coherent,
     /// An isovalue, within 1 %, that moves by 0.5 % of the range a frame.
     pub iso: Coherent,

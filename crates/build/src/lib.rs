@@ -52,6 +52,7 @@ pub use memory::{memory_needed_in_parts, memory_needed_in_pieces};
 pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
 pub use remedy::Remedy;
 
+use serde::Serialize;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use tetralod::mesh::{InputCell, MeshError, TetMesh};
@@ -185,7 +186,7 @@ pub struct BuildResult<M = Mt> {
 }
 
 /// Counts of a finished build.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BuildSummary {
     /// Vertices of the reference mesh.
     pub vertices: u32,
@@ -202,6 +203,7 @@ pub struct BuildSummary {
     /// Length of the longest chain of updates, each of which depends on the one before.
     pub depth: u32,
     /// How far interfaces between regions have moved, in model units; see [`BuildConfig::preserve_within`].
+    #[serde(skip)]
     pub interface_deviation: f64,
 }
 

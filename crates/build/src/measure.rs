@@ -9,10 +9,8 @@
 //! boundary within its distance count as well, and the one that fits best is taken.
 
 mod angles;
-mod fit;
 
-pub use angles::CellAngles;
-pub use fit::{Differences, Fit, fit};
+pub use angles::{CellAngles, CellsBelow};
 
 use glam::DVec3;
 use tetralod::geom::{Bounds, PointGrid, TetPlaces, TriangleGrid, weights_on_triangle};

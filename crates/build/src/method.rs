@@ -34,14 +34,6 @@ pub enum BuildCriterion {
 /// |---|--:|--:|--:|
 /// | uniform | 42.1 % | 24.1 % | 97 120 / 49 770 / 18 712 |
 /// | regions | 40.2 % | 21.5 % | 99 259 / 51 996 / 18 928 |
-///
-/// The mean error of meshes of few tetrahedra gets smaller where the sum of squares counts, and the largest one larger. For the same bucky,
-/// of the range, at 10 / 5 / 2 % of its tetrahedra:
-///
-/// | | root of the mean square, % | largest, % |
-/// |---|--:|--:|
-/// | uniform | 1.24 / 2.34 / 4.30 | 4.7 / 9.4 / 18.5 |
-/// | mean | 1.08 / 1.98 / 3.36 | 5.5 / 10.9 / 18.7 |
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Purpose {
     /// Meshes of one error everywhere: levels are 2^¼ wide.
@@ -49,21 +41,17 @@ pub enum Purpose {
     Uniform,
     /// Regions at full detail: levels are √2 wide.
     Regions,
-    /// Meshes of few tetrahedra with a small mean error: what adds much to the sum of the squares of the errors, for each tetrahedron that it
-    /// saves, goes later, however small the largest error is. Errors that are stored are the largest as ever.
-    Mean,
 }
 
 impl Purpose {
     /// All purposes.
-    pub const ALL: [Self; 3] = [Self::Uniform, Self::Regions, Self::Mean];
+    pub const ALL: [Self; 2] = [Self::Uniform, Self::Regions];
 
     /// The purpose in one word, as options have it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Uniform => "uniform",
             Self::Regions => "regions",
-            Self::Mean => "mean",
         }
     }
 }

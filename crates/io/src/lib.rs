@@ -8,7 +8,7 @@
 //! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
 //! | VTK XML, each of these in several files | `.pvtu`, `.pvti`, `.pvtr`, `.pvts` | by [`read`]; feature `formats` | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
-//! | Gmsh, versions 1 to 4.1 | `.msh` | text and binary; feature `formats` | |
+//! | Gmsh, versions 2 to 4.1 | `.msh` | text and binary; feature `formats` | |
 //! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; feature `formats` | |
 //! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
 //! | Netgen | `.vol` | feature `formats` | |

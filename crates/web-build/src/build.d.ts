@@ -35,7 +35,7 @@ export interface CoreBuildOptions {
   /** By what criterion vertices go or come. Default: `"half-edge"` with method decimate. */
   criterion?: "delaunay" | "half-edge";
   /** What it is for, with method decimate. Default: `"uniform"`. */
-  purpose?: "uniform" | "regions" | "mean";
+  purpose?: "uniform" | "regions";
   /** Whether tetrahedra have errors of their own, with method insert. */
   tetErrors?: boolean;
   /** Names of the fields to keep, in this order; a vector's name for its components. Default: the first field. */

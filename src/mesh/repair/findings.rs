@@ -3,6 +3,7 @@
 use std::fmt;
 
 use glam::DVec3;
+use serde::Serialize;
 
 use super::weld::places;
 use crate::mesh::adjacency::{check_indices, components, is_odd, non_manifold};
@@ -10,7 +11,7 @@ use crate::mesh::{MeshError, RepairLevel, TetMesh, boundary_faces, neighbors};
 
 /// What a valid mesh has that users may not expect; displays as one line, empty for a mesh of one part whose boundary
 /// is a surface without open seams.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MeshFindings {
     /// Parts that hang together by faces.
     pub components: usize,

@@ -30,12 +30,14 @@ pub use level::RepairLevel;
 
 use std::fmt;
 
+use serde::Serialize;
+
 use crate::mesh::adjacency::{DisjointSets, FaceTable, HalfFace, crowded, match_faces};
 use crate::mesh::check::{Sides, check_arrays};
 use crate::mesh::{FACES, InputCell, MeshError, NONE, TetMesh};
 
 /// What [`repair_at`] did; displays as one line, empty when there was nothing to do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RepairReport {
     /// Points merged into a coincident one.
     pub merged_points: usize,
@@ -44,12 +46,16 @@ pub struct RepairReport {
     /// Merged and welded points of which a field value differed from that of the point that stayed.
     pub differing_values: usize,
     /// Tetrahedra dropped because two of their vertices are one.
+    #[serde(rename = "collapsed_tetrahedra")]
     pub collapsed_tets: usize,
     /// Tetrahedra dropped because an earlier one has the same vertices.
+    #[serde(rename = "duplicate_tetrahedra")]
     pub duplicate_tets: usize,
     /// Inverted tetrahedra that were turned round.
+    #[serde(rename = "turned_tetrahedra")]
     pub turned_tets: usize,
     /// Flat tetrahedra dropped from the boundary.
+    #[serde(rename = "flat_tetrahedra")]
     pub flat_tets: usize,
     /// Points dropped because no tetrahedron uses them.
     pub unused_points: usize,

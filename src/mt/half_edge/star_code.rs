@@ -16,7 +16,7 @@
 
 use super::scratch::{MOST, NO_ENTRY, NewTet, Scratch, hash_labels};
 use super::store::{ForestChild, HalfEdgeMt};
-use crate::geom::{orient3d, sort_few};
+use crate::geom::orient3d;
 use crate::mesh::NONE;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::mesh::tet::TURN;
@@ -114,7 +114,7 @@ impl CodeIo for Reader<'_> {
                 .copied()
                 .reduce(|best, choice| if comes_before(&choice, &best).is_lt() { choice } else { best });
         }
-        sort_few(choices, |a, b| comes_before(a, b).is_lt());
+        choices.sort_by(comes_before);
         choices.get(rank).copied()
     }
 
@@ -152,7 +152,7 @@ struct Writer<'a> {
 
 impl CodeIo for Writer<'_> {
     fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice> {
-        sort_few(choices, |a, b| comes_before(a, b).is_lt());
+        choices.sort_by(comes_before);
         let remover = self.truth[tet].0;
         let rank = choices.iter().position(|choice| choice.remover == remover);
         let rank = rank.or_else(|| choices.iter().position(|choice| choice.remover == FURTHER))?;

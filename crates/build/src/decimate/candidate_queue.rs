@@ -9,31 +9,24 @@ use tetralod::mt::ErrorCode;
 /// Errors below this one count as equal; larger ones are grouped in levels.
 const FINEST: f64 = 2e-4;
 
-/// In a mesh of equal errors everywhere the largest is some five times the root of the mean square. A little more than that makes the
-/// mean less still, and the largest hardly larger.
-const MEAN: f64 = 8.0;
-
 /// The levels of error.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Levels {
     /// Bits of an error's code that do not count for its level.
     bits: u32,
-    /// So many times the root of the mean square counts as a largest error does; 0 if it does not count.
-    pub mean: f64,
 }
 
 impl Levels {
     /// Two for each power of two: each is about √2 wide.
-    pub const HALVES: Self = Self { bits: 10, mean: 0.0 };
+    pub const HALVES: Self = Self { bits: 10 };
     /// Four for each power of two: each is about 2^¼ wide.
-    pub const QUARTERS: Self = Self { bits: 9, mean: 0.0 };
+    pub const QUARTERS: Self = Self { bits: 9 };
 
     /// The levels for a purpose.
     pub fn of_purpose(purpose: Purpose) -> Self {
         match purpose {
             Purpose::Uniform => Self::QUARTERS,
             Purpose::Regions => Self::HALVES,
-            Purpose::Mean => Self { mean: MEAN, ..Self::QUARTERS },
         }
     }
 

@@ -194,7 +194,6 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         let vertices = (0..self.state.reference.points).filter(|&v| self.state.mesh.has(v)).count();
         loop {
             let before = self.record.len();
-            self.state.weigh_squares(vertices - before);
             self.round(progress)?;
             self.compact();
             let after = self.record.len();
@@ -206,12 +205,11 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
 
     /// Frees what belongs to tetrahedra that are gone, if they are many.
     fn compact(&mut self) {
-        let State { mesh, buckets, removals, restrictions, squares, .. } = &mut self.state;
+        let State { mesh, buckets, removals, restrictions, .. } = &mut self.state;
         if let Some(live) = mesh.compact() {
             buckets.renumber(&live);
             keep(&mut removals.makers, &live);
             restrictions.renumber(&live);
-            squares.renumber(&live);
             self.record.renumber(&live);
         }
     }
@@ -335,7 +333,6 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         slots.iter().for_each(|&t| removals.makers[t as usize] = removal);
         let input = Input { hole, filling: &best.filling, reference };
         best.cost.move_points(&mut state.buckets, slots, input);
-        state.squares.set(slots, &best.cost.squares);
         let star = hole.faces.iter().flat_map(|(face, _)| face);
         star.for_each(|&v| degrees[v as usize] -= 1);
         degrees[hole.a as usize] -= hole.star.len() as u32;

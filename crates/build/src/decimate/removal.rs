@@ -10,16 +10,12 @@ use crate::decimate::candidate_queue::{Key, Levels};
 use crate::error::cost::{Buckets, Reference, largest};
 use crate::error::fill_cost::{FillCost, HoleCost, Input, Removals};
 use crate::error::points::{as_vec, squared_length};
-use crate::error::squares::Squares;
 use crate::lattice::quantize::Quantized;
 use crate::order::reach;
 use crate::order::reach::{Reach, Ruler};
 use crate::restrict::restrictions::Restrictions;
 use glam::DVec3;
 use tetralod::mesh::NONE;
-
-/// A removal usually takes away about so many tetrahedra more than it makes.
-const USUALLY_FEWER: f64 = 6.0;
 
 /// What removals leave besides the mesh.
 pub(crate) struct History {
@@ -48,9 +44,6 @@ pub(crate) struct State<'a> {
     pub reaches: Vec<Reach>,
     pub ruler: Ruler,
     pub levels: Levels,
-    /// What a square of an error counts, times the square of [`Levels::mean`].
-    pub square_weight: f64,
-    pub squares: Squares,
     pub restrictions: Restrictions,
 }
 
@@ -75,8 +68,6 @@ impl<'a> State<'a> {
     ) -> Self {
         let quantized = reference.quantized;
         let History { buckets, removals, reaches } = history;
-        let squares =
-            if levels.mean > 0.0 { Squares::of(&mesh, &buckets, &reference) } else { Squares::default() };
         Self {
             gradients: quantized.gradients(&mesh.tets),
             reference,
@@ -89,8 +80,6 @@ impl<'a> State<'a> {
             reaches,
             ruler: Ruler::new(quantized),
             levels,
-            square_weight: 0.0,
-            squares,
             restrictions: Restrictions::default(),
             mesh,
         }
@@ -104,13 +93,6 @@ impl<'a> State<'a> {
     /// Whether a vertex belongs to a part that is built elsewhere, too.
     fn is_open(&self, v: u32) -> bool {
         self.open.get(v as usize).copied().unwrap_or(false)
-    }
-
-    /// Lets squares of errors count by how many points a star has on average: with so many vertices left, of which each tetrahedron
-    /// has four.
-    pub fn weigh_squares(&mut self, left: usize) {
-        let mean = self.levels.mean;
-        self.square_weight = mean * mean * left as f64 / (4.0 * f64::from(self.reference.points.max(1)));
     }
 
     /// What orders removals of one level, by [`Key::second`]: what reaches less far comes first, and then what leaves fewer
@@ -146,23 +128,14 @@ pub(crate) struct RemovalSearch {
 pub(crate) struct Candidate {
     pub filling: Filling,
     pub cost: FillCost,
-    /// What decides the level.
+    /// The largest error, which decides the level.
     error: f64,
 }
 
 impl Candidate {
     fn evaluate(&mut self, hole: &Hole, hole_cost: &HoleCost, state: &State<'_>, limit: f64) {
         let input = Input { hole, filling: &self.filling, reference: &state.reference };
-        let largest = self.cost.evaluate(hole_cost, &state.buckets, limit, input);
-        // What is stored is the largest error. Which level it belongs to may depend on the mean as well.
-        self.error = largest;
-        if state.square_weight > 0.0 {
-            // What the removal adds to the sum of squares, for each tetrahedron that it takes away.
-            let added = self.cost.squares.iter().sum::<f64>() - state.squares.sum(&hole.star);
-            let fewer = hole.star.len().saturating_sub(self.filling.tets.len()).max(1);
-            let square = added.max(0.0) * USUALLY_FEWER / fewer as f64;
-            self.error = largest.max((state.square_weight * square).sqrt());
-        }
+        self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input);
     }
 }
 

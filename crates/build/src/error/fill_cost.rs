@@ -75,8 +75,6 @@ pub(crate) struct FillCost {
     flat: bool,
     /// How far the boundary moves, as an error.
     pub step: f64,
-    /// For each tetrahedron the sum of the squares of the errors at the points that are placed in it.
-    pub squares: Vec<f64>,
 }
 
 impl Removals {
@@ -119,8 +117,6 @@ impl FillCost {
         self.step = 0.0;
         self.placement.start(filling.tets.len());
         self.placement.errors.clone_from(&hole_cost.errors);
-        self.squares.clear();
-        self.squares.resize(filling.tets.len(), 0.0);
         self.compare_centre(input);
         if largest(&self.placement.errors) > limit {
             return largest(&self.placement.errors);
@@ -143,7 +139,7 @@ impl FillCost {
             }
             placement.raise(chords(filling, reference));
         }
-        let Self { placement, squares, .. } = self;
+        let placement = &mut self.placement;
         let mut error = largest(&placement.errors);
         let mut hint = 0;
         for s in &hole.star {
@@ -151,7 +147,6 @@ impl FillCost {
                 let (own, cell) = placement.place(point, hint, &input);
                 hint = cell;
                 error = error.max(own);
-                squares[cell] += own * own;
                 if error > limit {
                     return error;
                 }
@@ -168,8 +163,7 @@ impl FillCost {
     fn compare_centre(&mut self, input: Input<'_>) {
         let (a, quantized) = (input.hole.a, input.reference.quantized);
         if !quantized.is_moved(a) {
-            let (own, cell) = self.placement.place(a, 0, &input);
-            self.squares[cell] += own * own;
+            self.placement.place(a, 0, &input);
             return;
         }
         let (cell, lambda, depth) = self.placement.locate(quantized.places.at(a), 0, &input);

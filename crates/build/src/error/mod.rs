@@ -6,4 +6,3 @@ pub(crate) mod fill_cost;
 pub(crate) mod outside_points;
 pub(crate) mod placement;
 pub(crate) mod points;
-pub(crate) mod squares;

@@ -1,36 +1,49 @@
 //! How good the cells of a mesh are: their smallest dihedral angles.
 
 use glam::DVec3;
+use serde::Serialize;
 use tetralod::geom::sharpness;
 
 /// How the smallest dihedral angles of the cells of a mesh are distributed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CellAngles {
     /// The smallest angle of all, in degrees; none without cells.
     pub least: Option<f64>,
     /// How many cells there are.
+    #[serde(skip)]
     pub cells: u64,
-    /// How many of them have an angle below each of [`CellAngles::DEGREES`].
-    pub below: [u64; CellAngles::DEGREES.len()],
+    /// How many of them have a small angle.
+    pub below: [CellsBelow; DEGREES.len()],
 }
 
-impl CellAngles {
-    /// The angles at which cells are counted.
-    pub const DEGREES: [f64; 6] = [1.0, 5.0, 10.0, 20.0, 30.0, 40.0];
+/// How many cells have an angle below a limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CellsBelow {
+    /// The limit.
+    pub degrees: f64,
+    /// How many they are.
+    pub cells: u64,
+}
 
+/// The angles at which cells are counted.
+const DEGREES: [f64; 6] = [1.0, 5.0, 10.0, 20.0, 30.0, 40.0];
+
+impl CellAngles {
     /// Of cells with these corners.
     pub fn of(cells: impl Iterator<Item = [[f64; 3]; 4]>) -> Self {
-        let limits = Self::DEGREES.map(|degrees| {
+        let limits = DEGREES.map(|degrees| {
             let cosine = libm::cos(degrees.to_radians());
             cosine * cosine
         });
-        let mut found = Self { least: None, cells: 0, below: [0; Self::DEGREES.len()] };
+        let below = DEGREES.map(|degrees| CellsBelow { degrees, cells: 0 });
+        let mut found = Self { least: None, cells: 0, below };
         let mut sharpest = -1.0_f64;
         for corners in cells {
             let own = sharpness(corners.map(DVec3::from));
             sharpest = sharpest.max(own);
             found.cells += 1;
-            found.below.iter_mut().zip(limits).for_each(|(count, limit)| *count += u64::from(own > limit));
+            let below = found.below.iter_mut().zip(limits);
+            below.for_each(|(below, limit)| below.cells += u64::from(own > limit));
         }
         let cosine = libm::sqrt(sharpest.abs()).copysign(sharpest);
         found.least = (found.cells > 0).then(|| libm::acos(cosine).to_degrees());
@@ -49,7 +62,7 @@ mod tests {
         // The slope of the face above the right angle: √2 times the height.
         let least = (0.01 * 2.0_f64.sqrt()).atan().to_degrees();
         assert!((angles.least.unwrap() - least).abs() < 1e-6, "{angles:?}");
-        assert_eq!((angles.cells, angles.below), (3, [1, 1, 2, 2, 2, 2]));
+        assert_eq!((angles.cells, angles.below.map(|below| below.cells)), (3, [1, 1, 2, 2, 2, 2]));
         assert_eq!(CellAngles::of(std::iter::empty()).least, None);
     }
 }

@@ -55,7 +55,6 @@ pub struct Plan {
     /// Whether regions are kept apart.
     pub(super) has_regions: bool,
     pub(super) for_regions: bool,
-    pub(super) for_mean: bool,
     pub(super) block_bits: u32,
     pub(super) metadata: BTreeMap<String, String>,
 }
@@ -132,7 +131,6 @@ impl Plan {
             angles: [config.min_dihedral, config.feature_angle],
             has_regions: !config.preserve.is_empty(),
             for_regions: purpose == Purpose::Regions,
-            for_mean: purpose == Purpose::Mean,
             block_bits: config.block_bits.clamp(4, 16),
             metadata,
         }
@@ -237,10 +235,6 @@ impl Plan {
     }
 
     pub(super) fn purpose(&self) -> Purpose {
-        match (self.for_regions, self.for_mean) {
-            (true, _) => Purpose::Regions,
-            (false, true) => Purpose::Mean,
-            (false, false) => Purpose::Uniform,
-        }
+        if self.for_regions { Purpose::Regions } else { Purpose::Uniform }
     }
 }

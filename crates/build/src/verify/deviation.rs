@@ -53,18 +53,25 @@ pub struct Measured {
 /// Failures of one kind that are described for each query.
 const DESCRIBED: usize = 3;
 
+/// Refuses an input of another size than that of the MT.
+pub fn check_counts(info: &MtInfo, input: &TetMesh) -> Result<(), String> {
+    let [points, tets] = input.counts();
+    let wanted = [info.vertices, info.tetrahedra].map(u64::from);
+    if [points, tets] == wanted {
+        return Ok(());
+    }
+    let [vertices, tetrahedra] = wanted;
+    Err(format!(
+        "the MT was built from {vertices} vertices and {tetrahedra} tetrahedra, the input has {points} and {tets}: give the mesh that \
+         it was built from"
+    ))
+}
+
 impl<'a> Deviation<'a> {
     /// Prepares to compare with `input`, which has to be what `info` says. About `vertices` of the reference vertices
     /// are measured.
     pub fn new(info: &'a MtInfo, input: &'a TetMesh, vertices: usize) -> Result<Self, String> {
-        let (points, tets) = (input.positions.len(), input.tets.len());
-        if (points, tets) != (info.vertices as usize, info.tetrahedra as usize) {
-            return Err(format!(
-                "the MT was built from {} vertices and {} tetrahedra, the input has {points} and {tets}: give the \
-                 mesh that it was built from",
-                info.vertices, info.tetrahedra
-            ));
-        }
+        check_counts(info, input)?;
         let neighbors =
             tetralod::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
         let faces = boundary_faces(&input.tets, &neighbors).map(|(_, face)| face).collect();

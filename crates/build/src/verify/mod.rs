@@ -50,13 +50,14 @@ use expected::Expected;
 use history::Numbers;
 use mesh_checks::PlainMesh;
 use queries::Query;
+use serde::Serialize;
 use std::sync::Arc;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{ApplyUpdates, ErrorCode, check_errors};
 use tetralod::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetData};
 
 /// The result of a verification.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct VerifyReport {
     /// Whether all checks passed.
     pub valid: bool,

@@ -1,11 +1,10 @@
 //! Verification of single requests, for MTs of which not all is in memory: each is checked against the input near it alone.
 
-use super::deviation::Deviation;
+use super::deviation::{Deviation, check_counts};
 use super::history::Numbers;
 use super::mesh_checks::{PlainMesh, PlainReference, Shape};
 use super::queries::Query;
 use super::{Case, VerifyReport, fresh, note, satisfy};
-use glam::DVec3;
 use std::collections::BTreeSet;
 use tetralod::geom::{Bounds, LatticeBox, tet_meets_box};
 use tetralod::mesh::{FACES, Field, Grid, NONE, TetMesh, boundary_faces, kuhn_tets, neighbors};
@@ -66,8 +65,8 @@ pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec
 
 /// Checks the mesh of one request against `input`, what the MT was built from, or a [grid alone](TetMesh::of_grid_alone): that it is
 /// valid and conforming and has the topology of the base mesh, that all errors are within their bounds, where they are measured, that the
-/// answer is true, and that coarsening leads back to the base mesh. In a box with error 0 the tetrahedra must be those of the input; in
-/// any box in which the boundary cannot have moved their volumes must add up. `mt` needs to have only what the request needs.
+/// answer is true, and that coarsening leads back to the base mesh. In a box with error 0 the tetrahedra must be those of the input.
+/// `mt` needs to have only what the request needs.
 pub fn run_request<M: ApplyUpdates>(mt: &M, input: &TetMesh, sample: &SampleRequest) -> VerifyReport {
     let mut report = VerifyReport::default();
     if let Err(failure) = check(mt, input, sample, &mut report) {
@@ -84,15 +83,7 @@ fn check<M: ApplyUpdates>(
     report: &mut VerifyReport,
 ) -> Result<(), String> {
     let info = mt.info();
-    let counts = [u64::from(info.vertices), u64::from(info.tetrahedra)];
-    if input.counts() != counts {
-        let [points, tets] = input.counts();
-        return Err(format!(
-            "the MT was built from {} vertices and {} tetrahedra, the input has {points} and {tets}: give the mesh that it was \
-             built from",
-            counts[0], counts[1]
-        ));
-    }
+    check_counts(info, input)?;
     let query = Query::new(&sample.name, sample.request.clone());
     let around = match &query.request.needs[..] {
         [need] => region(need).map(|inside| (inside, need)),
@@ -107,7 +98,7 @@ fn check<M: ApplyUpdates>(
         }
         None => Near::sparse(input)?,
     };
-    let mut deviation = Deviation::of(info, &near.mesh, near.faces.clone(), most)?;
+    let mut deviation = Deviation::of(info, &near.mesh, near.faces, most)?;
     let base = fresh(mt)?;
     let plain = PlainMesh::of(base.mesh());
     let shape = Shape::of(&PlainReference { positions: plain.positions, levels: &[], tets: plain.tets })
@@ -119,12 +110,11 @@ fn check<M: ApplyUpdates>(
     }
     Case { mt, query: &query, front: &front, outcome: &outcome }.check(&base, &shape, &mut deviation, report);
     report.queries += 1;
-    if let Some((inside, need)) = around.filter(|(_, need)| matches!(need.part, Part::Region(_))) {
-        let inside = Inside { info, near: &near, inside, mesh: PlainMesh::of(front.mesh()) };
-        let same = if need.error == 0.0 { inside.check_tets() } else { Ok(()) };
-        for failure in [same, inside.check_volume(need.error)].into_iter().filter_map(Result::err) {
-            note(report, &query, &failure);
-        }
+    let exact = |(_, need): &(Bounds, &Need)| need.error == 0.0 && matches!(need.part, Part::Region(_));
+    if let Some((inside, _)) = around.filter(exact)
+        && let Err(failure) = check_tets(info, &near.mesh, &inside, &PlainMesh::of(front.mesh()))
+    {
+        note(report, &query, &failure);
     }
     satisfy(mt, &mut front, &Query::new("full coarsening", Request::within(f64::INFINITY)))?;
     if front.mesh().hash() != base.mesh().hash() {
@@ -295,91 +285,38 @@ fn values(input: &TetMesh, points: &[usize]) -> Result<Vec<Field>, String> {
     input.fields.iter().map(of).collect()
 }
 
-/// A box, what the input has there, and a mesh.
-struct Inside<'a> {
-    info: &'a MtInfo,
-    near: &'a Near,
-    inside: Bounds,
-    mesh: PlainMesh<'a>,
-}
-
-/// Volumes are compared up to this part.
-const VOLUME_SLACK: f64 = 1e-9;
-
-impl Inside<'_> {
-    /// Whether the tetrahedra in the box are those of the input. Those that only touch its rim may be either.
-    fn check_tets(&self) -> Result<(), String> {
-        let Self { info, near, inside, mesh } = self;
-        let [low, high] = [inside.min, inside.max].map(|p| self.on_lattice(p));
-        let region = LatticeBox {
-            min: [0, 1, 2].map(|k| (low[k].floor() as i32).saturating_add(1)),
-            max: [0, 1, 2].map(|k| (high[k].ceil() as i32).saturating_sub(1)),
-        };
-        let fields: Vec<&Field> = info
-            .fields
-            .iter()
-            .filter_map(|field| near.mesh.fields.iter().find(|known| field.is_of(known)))
-            .collect();
-        let hash = |p: [i32; 3], levels: &mut dyn Iterator<Item = i32>| {
-            p.into_iter().chain(levels).fold(0, |h, word| mix(h ^ u64::from(word as u32)))
-        };
-        let positions: Vec<[i32; 3]> = near.mesh.positions.iter().map(|&p| info.lattice.nearest(p)).collect();
-        let wanted = keys(&positions, &near.mesh.tets, &region, |v| {
-            let levels =
-                fields.iter().zip(&info.fields).map(|(known, field)| field.nearest(known.values[v as usize]));
-            hash(positions[v as usize], &mut levels.into_iter())
-        });
-        let found = keys(mesh.positions, mesh.tets, &region, |v| {
-            hash(mesh.positions[v as usize], &mut mesh.mesh.levels(v).iter().copied())
-        });
-        if found == wanted {
-            return Ok(());
-        }
-        let common = found.iter().filter(|key| wanted.binary_search(key).is_ok()).count();
-        Err(format!(
-            "of {} tetrahedra in the box {common} are of the input, which has {} there",
-            found.len(),
-            wanted.len()
-        ))
+/// Whether the tetrahedra in a box are those of the input near it. Those that only touch its rim may be either.
+fn check_tets(info: &MtInfo, input: &TetMesh, inside: &Bounds, mesh: &PlainMesh<'_>) -> Result<(), String> {
+    let lattice = &info.lattice;
+    let on_lattice = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - lattice.origin[k]) / lattice.step[k]);
+    let [low, high] = [inside.min, inside.max].map(on_lattice);
+    let region = LatticeBox {
+        min: low.map(|x| (x.floor() as i32).saturating_add(1)),
+        max: high.map(|x| (x.ceil() as i32).saturating_sub(1)),
+    };
+    let fields: Vec<&Field> =
+        info.fields.iter().filter_map(|field| input.fields.iter().find(|known| field.is_of(known))).collect();
+    let hash = |p: [i32; 3], levels: &mut dyn Iterator<Item = i32>| {
+        p.into_iter().chain(levels).fold(0, |h, word| mix(h ^ u64::from(word as u32)))
+    };
+    let positions: Vec<[i32; 3]> = input.positions.iter().map(|&p| lattice.nearest(p)).collect();
+    let wanted = keys(&positions, &input.tets, &region, |v| {
+        let levels =
+            fields.iter().zip(&info.fields).map(|(known, field)| field.nearest(known.values[v as usize]));
+        hash(positions[v as usize], &mut levels.into_iter())
+    });
+    let found = keys(mesh.positions, mesh.tets, &region, |v| {
+        hash(mesh.positions[v as usize], &mut mesh.mesh.levels(v).iter().copied())
+    });
+    if found == wanted {
+        return Ok(());
     }
-
-    /// Whether the volumes of the tetrahedra, as far as they are in the box, add up to what is inside of the domain there.
-    fn check_volume(&self, error: f64) -> Result<(), String> {
-        let Self { near, mesh, .. } = self;
-        let places = |positions: &[[i32; 3]]| -> Vec<DVec3> {
-            positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect()
-        };
-        let reference: Vec<[i32; 3]> =
-            near.mesh.positions.iter().map(|&p| self.info.lattice.nearest(p)).collect();
-        let (ours, theirs) = (places(mesh.positions), places(&reference));
-        let [low, high] = [self.inside.min, self.inside.max].map(|p| DVec3::from(self.on_lattice(p)));
-        let touches = |corners: &[DVec3]| {
-            let least = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-            let most = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-            least.cmple(high).all() && most.cmpge(low).all()
-        };
-        let has_boundary = mesh.boundary().any(|(_, face)| touches(&face.map(|v| ours[v as usize])))
-            || near.faces.iter().any(|face| touches(&face.map(|v| theirs[v as usize])));
-        let sum = |places: &[DVec3], tets: &[[u32; 4]]| -> f64 {
-            let corners = tets.iter().map(|tet| tet.map(|v| places[v as usize]));
-            corners.filter(|corners| touches(corners)).map(|corners| clipped(corners, low, high, 0)).sum()
-        };
-        let wanted = match has_boundary {
-            false => (high - low).element_product(),
-            true if error == 0.0 => sum(&theirs, &near.mesh.tets),
-            true => return Ok(()),
-        };
-        let found = sum(&ours, mesh.tets);
-        if (found - wanted).abs() <= VOLUME_SLACK * wanted.max(1.0) {
-            return Ok(());
-        }
-        Err(format!("the volumes in the box add up to {} of what is there", found / wanted))
-    }
-
-    fn on_lattice(&self, p: [f64; 3]) -> [f64; 3] {
-        let lattice = &self.info.lattice;
-        [0, 1, 2].map(|k| (p[k] - lattice.origin[k]) / lattice.step[k])
-    }
+    let common = found.iter().filter(|key| wanted.binary_search(key).is_ok()).count();
+    Err(format!(
+        "of {} tetrahedra in the box {common} are of the input, which has {} there",
+        found.len(),
+        wanted.len()
+    ))
 }
 
 /// The tetrahedra that meet a box, by what is known of their corners; sorted.
@@ -398,61 +335,4 @@ fn keys(
     let mut all: Vec<[u64; 4]> = tets.iter().filter(meets).map(key).collect();
     all.sort_unstable();
     all
-}
-
-/// The volume of a tetrahedron inside of a box: clipped at one side after the other, from side `side` on.
-fn clipped(corners: [DVec3; 4], low: DVec3, high: DVec3, side: usize) -> f64 {
-    if side == 6 {
-        let [a, b, c, d] = corners;
-        return ((b - a).cross(c - a).dot(d - a) / 6.0).abs();
-    }
-    let (axis, is_high) = (side / 2, side % 2 == 1);
-    // How far inside a corner is.
-    let depth = |p: DVec3| if is_high { high[axis] - p[axis] } else { p[axis] - low[axis] };
-    let mut sorted = corners;
-    sorted.sort_by(|&p, &q| depth(q).total_cmp(&depth(p)));
-    let [a, b, c, d] = sorted;
-    let cut = |p: DVec3, q: DVec3| p.lerp(q, depth(p) / (depth(p) - depth(q)));
-    let next = |corners: [DVec3; 4]| clipped(corners, low, high, side + 1);
-    match sorted.iter().filter(|&&p| depth(p) > 0.0).count() {
-        0 => 0.0,
-        1 => next([a, cut(a, b), cut(a, c), cut(a, d)]),
-        2 => {
-            let [ac, ad, bc, bd] = [cut(a, c), cut(a, d), cut(b, c), cut(b, d)];
-            // A wedge between the triangles of its two ends.
-            next([a, ac, ad, b]) + next([ac, ad, b, bc]) + next([ad, b, bc, bd])
-        }
-        3 => {
-            let [ad, bd, cd] = [cut(a, d), cut(b, d), cut(c, d)];
-            next([a, b, c, ad]) + next([b, c, ad, bd]) + next([c, ad, bd, cd])
-        }
-        _ => next(corners),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn clipped_volumes_add_up() {
-        let mut numbers = Numbers(7);
-        let mut point = || DVec3::new(numbers.part(), numbers.part(), numbers.part());
-        for _ in 0..200 {
-            let corners = [point(), point(), point(), point()];
-            let whole = clipped(corners, DVec3::splat(-1.0), DVec3::splat(2.0), 0);
-            let cut = point();
-            // The eight boxes around a point.
-            let parts: f64 = (0..8)
-                .map(|i| {
-                    let is_low = |k: usize| i >> k & 1 == 0;
-                    let end = |k: usize, low: f64, high: f64| if is_low(k) { low } else { high };
-                    let low = DVec3::new(end(0, -1.0, cut.x), end(1, -1.0, cut.y), end(2, -1.0, cut.z));
-                    let high = DVec3::new(end(0, cut.x, 2.0), end(1, cut.y, 2.0), end(2, cut.z, 2.0));
-                    clipped(corners, low, high, 0)
-                })
-                .sum();
-            assert!((parts - whole).abs() < 1e-12, "{parts} {whole}");
-        }
-    }
 }

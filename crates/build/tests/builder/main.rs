@@ -3,12 +3,10 @@
 mod delaunay;
 mod exact_values;
 mod fields;
-mod fit;
 mod flat_boundaries;
 mod measure;
 mod parts;
 mod pieces;
-mod purposes;
 mod repair;
 mod restrictions;
 #[path = "../../../../tests/support/mod.rs"]

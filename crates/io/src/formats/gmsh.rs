@@ -1,4 +1,4 @@
-//! Gmsh's meshes (`.msh`): versions 1, 2, 4.0 and 4.1, ASCII and binary in either byte order; elements of the first and second
+//! Gmsh's meshes (`.msh`): versions 2, 4.0 and 4.1, ASCII and binary in either byte order; elements of the first and second
 //! order; views at nodes, elements and nodes of elements, with their time steps. Elements without a volume are left out, as are
 //! partitions and periodicity. By <https://gmsh.info/doc/texinfo/gmsh.html#Gmsh-file-formats>.
 //!
@@ -18,13 +18,12 @@ use crate::number::NumberType;
 use crate::{CellData, ReadOptions};
 use tetralod::mesh::TetMesh;
 
-/// How files begin.
-const FIRST: [&str; 3] = ["$MeshFormat", "$NOD", "$Comments"];
+/// How files begin, the last one those of version 1.
+const FIRST: [&str; 3] = ["$MeshFormat", "$Comments", "$NOD"];
 
 /// Which of the layouts a file has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Version {
-    One,
     Two,
     Four,
     FourOne,
@@ -142,16 +141,8 @@ impl<'a> Mesh<'a> {
         let missing = || ReadReason::Missing("section $MeshFormat".into());
         match name {
             "$MeshFormat" => self.layout = Some(read_format(file)?),
-            "$NOD" | "$ELM" => {
-                let wide = NumberType::U64;
-                let layout = Layout { version: Version::One, binary: false, big: false, wide };
-                self.layout = Some(layout);
-                if name == "$NOD" {
-                    read_nodes(self, file, layout)?
-                } else {
-                    read_elements(self, file, layout)?
-                }
-            }
+            // These sections are of version 1 alone.
+            "$NOD" | "$ELM" => return Err(unsupported("1")),
             "$Entities" => read_entities(self, file, self.layout.ok_or_else(missing)?)?,
             "$Nodes" => read_nodes(self, file, self.layout.ok_or_else(missing)?)?,
             "$Elements" => read_elements(self, file, self.layout.ok_or_else(missing)?)?,
@@ -324,10 +315,7 @@ fn read_format(file: &mut Scanner<'_>) -> Result<Layout, ReadReason> {
         "2" | "2.0" | "2.1" | "2.2" => Version::Two,
         "4" | "4.0" => Version::Four,
         "4.1" => Version::FourOne,
-        other => {
-            let what = format!("version \"{}\"", other.chars().take(24).collect::<String>());
-            return Err(ReadReason::Unsupported { what, remedy: "save it as version 2.2 or 4.1".into() });
-        }
+        other => return Err(unsupported(other)),
     };
     let binary = file.number::<i32>()? != 0;
     let wide = match file.number::<i32>()? {
@@ -346,6 +334,14 @@ fn read_format(file: &mut Scanner<'_>) -> Result<Layout, ReadReason> {
         };
     }
     Ok(Layout { version, binary, big, wide })
+}
+
+fn unsupported(version: &str) -> ReadReason {
+    let shown: String = version.chars().take(24).collect();
+    ReadReason::Unsupported {
+        what: format!("version \"{shown}\" of Gmsh's format"),
+        remedy: "save it as version 2.2 or 4.1".into(),
+    }
 }
 
 /// Steps over a section, which ends with its name behind `$End`.
@@ -475,14 +471,13 @@ mod tests {
         file
     }
 
-    fn ascii() -> [String; 3] {
+    fn ascii() -> [String; 2] {
         let four_one = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n2 0 0 0 1 1 1 0 0\n$EndEntities\n\
             $Nodes\n1 4 2 9\n3 2 0 4\n7\n2\n9\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n\
             $Elements\n2 2 1 5\n2 3 2 1\n1 7 2 9\n3 2 4 1\n5 7 2 9 4\n$EndElements\n";
         let four = "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Nodes\n1 4\n2 3 1 4\n7 0 0 0 5 5 5\n2 1 0 0 5 5 5\n9 0 1 0 5 5 5\n\
             4 0 0 1 5 5 5\n$EndNodes\n$Elements\n2 2\n3 2 2 1\n1 7 2 9\n2 3 4 1\n5 7 2 9 4\n$EndElements\n";
-        let one = "$NOD\n4\n7 0 0 0\n2 1 0 0\n9 0 1 0\n4 0 0 1\n$ENDNOD\n$ELM\n2\n1 2 8 3 3 7 2 9\n5 4 6 2 4 7 2 9 4\n$ENDELM\n";
-        [four_one, four, one].map(str::to_owned)
+        [four_one, four].map(str::to_owned)
     }
 
     #[test]
@@ -503,7 +498,7 @@ mod tests {
 
     #[test]
     fn groups_of_volumes_in_version_4() {
-        let [four_one, four, _] = ascii();
+        let [four_one, four] = ascii();
         let groups = |text: &str| {
             let mesh = read(text.as_bytes(), &everything()).unwrap();
             mesh.cell_fields.iter().find(|f| f.name == "physical").map(|f| f.values.clone())
@@ -619,7 +614,7 @@ mod tests {
 
     #[test]
     fn partitions_of_volumes_have_their_groups() {
-        let [four_one, ..] = ascii();
+        let [four_one, _] = ascii();
         let section = "$PartitionedEntities\n2\n0\n1 0 0 1\n1 0 9 1 1 0 0 0 1 7\n\
             5 3 2 1 1 0 0 0 1 1 1 1 6 0\n$EndPartitionedEntities\n$Nodes";
         let text = four_one.replacen("$Nodes", section, 1).replace("\n3 2 4 1\n", "\n3 5 4 1\n");
@@ -650,7 +645,15 @@ mod tests {
             read(TWO.replacen(from, to, 1).as_bytes(), &everything()).unwrap_err().to_string()
         };
         assert!(refused("9 0 1 0", "9 0 x 0").contains("$Nodes, line 12: \"x\" is not a number"));
-        assert!(refused("2.2 0 8", "3.0 0 8").contains("version \"3.0\" cannot be read here"));
+        assert!(
+            refused("2.2 0 8", "3.0 0 8").contains("version \"3.0\" of Gmsh's format cannot be read here")
+        );
+        let first =
+            "$NOD\n4\n7 0 0 0\n2 1 0 0\n9 0 1 0\n4 0 0 1\n$ENDNOD\n$ELM\n1\n5 4 6 2 4 7 2 9 4\n$ENDELM\n";
+        let error = read(first.as_bytes(), &everything()).unwrap_err();
+        let version = "version \"1\" of Gmsh's format".to_owned();
+        let remedy = "save it as version 2.2 or 4.1".into();
+        assert_eq!(error.reason, ReadReason::Unsupported { what: version, remedy });
         assert!(refused("7 2 9 4\n", "7 2 9 5\n").contains("node 5 is missing"));
         assert!(refused("5 4 3 6", "5 99 3 6").contains("elements of type 99"));
         assert!(refused("$EndNodes", "$EndNode").contains("instead of $EndNodes"));

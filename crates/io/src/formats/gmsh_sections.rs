@@ -32,8 +32,8 @@ impl Numbers<'_, '_> {
     }
 
     fn count(&mut self) -> Result<usize, ReadReason> {
-        // Versions 1 and 2 write counts as text in either encoding.
-        let has_text = matches!(self.layout.version, Version::One | Version::Two);
+        // Version 2 writes counts as text in either encoding.
+        let has_text = self.layout.version == Version::Two;
         let count = if has_text { self.file.number()? } else { self.wide()? };
         usize::try_from(count).map_err(|_| ReadReason::Syntax(format!("{count} is not a count")))
     }
@@ -149,7 +149,7 @@ pub(super) fn read_nodes(
     layout: Layout,
 ) -> Result<(), ReadReason> {
     let mut numbers = Numbers { file, layout };
-    if !matches!(layout.version, Version::One | Version::Two) {
+    if layout.version != Version::Two {
         numbers.end_line();
         return read_node_blocks(mesh, &mut numbers);
     }
@@ -232,7 +232,7 @@ pub(super) fn read_elements(
                 done += read_binary_block(mesh, &mut numbers)?;
             }
         }
-        Version::One | Version::Two => {
+        Version::Two => {
             for _ in 0..numbers.count()? {
                 read_element(mesh, &mut numbers)?;
             }
@@ -260,20 +260,12 @@ fn read_binary_block(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Resu
     Ok(count)
 }
 
-/// An element of version 1 or 2 as text.
+/// An element of version 2 as text.
 fn read_element(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Result<(), ReadReason> {
     let tag = numbers.int()?;
     let element = known(numbers.int()?)?;
-    if numbers.layout.version == Version::Two {
-        let tags = numbers.int()?;
-        let groups = read_groups(numbers, tags)?;
-        return add_element(mesh, numbers, element, tag, groups);
-    }
-    let groups = [Some(numbers.int()?), Some(numbers.int()?)];
-    let points = numbers.int()?;
-    if usize::try_from(points) != Ok(element.points) {
-        return Err(ReadReason::Syntax(format!("element {tag} has {points} points, not {}", element.points)));
-    }
+    let tags = numbers.int()?;
+    let groups = read_groups(numbers, tags)?;
     add_element(mesh, numbers, element, tag, groups)
 }
 
