@@ -1,6 +1,7 @@
 //! `tetralod generate`: data for trying things out, made by code.
 
-use super::{files, refuse_usage};
+use super::files;
+use super::usage::refuse_usage;
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::{Path, PathBuf};

@@ -55,7 +55,7 @@ pub fn name(path: &Path) -> String {
 /// Ends the program if a format is given for files.
 pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
     if format.is_some() && !paths.iter().any(|path| path == Path::new(STANDARD_INPUT)) {
-        super::refuse_usage(
+        crate::usage::refuse_usage(
             "--format goes with the standard input, '-'; the content of files says what they are",
         );
     }

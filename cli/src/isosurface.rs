@@ -34,7 +34,7 @@ struct Report {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let isovalues = arguments.query.isovalues();
     if isovalues.is_empty() {
-        super::refuse_usage("isosurface needs a value: give --iso V, in units of the field");
+        crate::usage::refuse_usage("isosurface needs a value: give --iso V, in units of the field");
     }
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;

@@ -32,11 +32,12 @@ mod slice;
 mod stats;
 mod streamlines;
 mod surface;
+mod usage;
 mod verify;
 
-use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
+use usage::refuse_usage;
 
 /// Very large tetrahedral volumes for web pages: builds, inspects and checks MT files.
 #[derive(Parser)]
@@ -94,6 +95,7 @@ fn keep_little_freed_memory() {
 fn main() -> ExitCode {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     keep_little_freed_memory();
+    usage::define(Arguments::command);
     match run(Arguments::parse().command) {
         Ok(code) => code,
         Err(error) => {
@@ -127,15 +129,4 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Serve(arguments) => serve::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Ends the program as wrong usage, with a word about what to do instead.
-fn refuse_usage(what: &str) -> ! {
-    let mut command = Arguments::command();
-    command.build();
-    let name = std::env::args().nth(1).unwrap_or_default();
-    match command.find_subcommand_mut(&name) {
-        Some(subcommand) => subcommand.error(ErrorKind::ArgumentConflict, what).exit(),
-        None => command.error(ErrorKind::ArgumentConflict, what).exit(),
-    }
 }

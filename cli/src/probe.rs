@@ -91,7 +91,7 @@ struct Samples {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.samples.is_some() && arguments.what.line.is_none() {
-        super::refuse_usage("--samples are points of a line: give --line, too");
+        crate::usage::refuse_usage("--samples are points of a line: give --line, too");
     }
     if let Some(target) = &arguments.output {
         let inputs = arguments.what.list.iter().chain(arguments.query.files());

@@ -132,7 +132,7 @@ impl Query {
 
     fn answer_with(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {
         if let Err(wrong) = self.group.check() {
-            super::refuse_usage(&wrong);
+            crate::usage::refuse_usage(&wrong);
         }
         self.refined(fetch_more).with_context(|| self.file.display().to_string())
     }

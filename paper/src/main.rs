@@ -7,9 +7,11 @@
 mod chart;
 mod figure8;
 mod figures;
+mod findings;
 mod markdown;
 mod model;
 mod node_code;
+mod node_table;
 mod own;
 mod pictures;
 mod published;
@@ -23,10 +25,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tetralod::mesh::TetMesh;
 
-use crate::figure8::Curves;
-use crate::figures::{AtZero, Boxed, Pair};
+use crate::findings::{Findings, Scan};
 use crate::model::{DataSet, Recipe};
-use crate::own::Own;
 use crate::table1::Row;
 
 /// Points along an edge of the generated bucky ball, as many as Smallbucky has.
@@ -34,48 +34,6 @@ const SIZE: u32 = 33;
 
 /// A data set so small that a test makes its rows again and compares them with the page in the repository.
 const SMALL: (&str, u32) = ("bucky, 9³ points", 9);
-
-/// What the page is made of.
-pub struct Findings {
-    pub rows: Vec<Row>,
-    /// Data sets that were not there.
-    pub missing: Vec<&'static str>,
-    pub figure_6: Pair,
-    pub figure_7: Pair,
-    pub uniform: Curves,
-    pub variable: Curves,
-    pub own: Vec<Own>,
-    pub boxes: Vec<Boxed>,
-    pub at_zero: Vec<AtZero>,
-    pub scan: Option<Scan>,
-}
-
-/// Figures 6 to 8 of a volume that was measured, not computed.
-pub struct Scan {
-    pub name: &'static str,
-    pub figure_6: Pair,
-    pub figure_7: Pair,
-    pub uniform: Curves,
-    pub variable: Curves,
-    pub boxes: Vec<Boxed>,
-    pub at_zero: Vec<AtZero>,
-}
-
-impl Scan {
-    fn of(name: &'static str, data: &DataSet) -> Result<Self> {
-        let inserted = &data.model(Recipe::Insert).mt;
-        let figure_6 = figures::around_isovalue(inserted, 0.001, published::FIGURE_6.uniform_facets)?;
-        Ok(Self {
-            name,
-            figure_7: figures::in_an_octant(&data.model(Recipe::Edge).mt, figure_6.isovalue)?,
-            uniform: figure8::curves(data, None)?,
-            variable: figure8::curves(data, Some(figure_6.isovalue))?,
-            boxes: figures::boxes(data)?,
-            at_zero: figures::at_zero(data)?,
-            figure_6,
-        })
-    }
-}
 
 fn main() -> ExitCode {
     match run() {
@@ -204,7 +162,7 @@ mod tests {
         let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/paper.md");
         let page = fs::read_to_string(page).unwrap();
         let rows = table1::rows(&small().unwrap()).unwrap();
-        let tables = [table1::storage(&rows, &[]), table1::structure(&rows, &[]), node_code::table(&rows)];
+        let tables = [table1::storage(&rows, &[]), table1::structure(&rows, &[]), node_table::table(&rows)];
         let lines = tables.iter().flat_map(|table| table.lines()).filter(|line| line.contains(SMALL.0));
         let missing: Vec<&str> = lines.clone().filter(|line| !page.contains(line)).collect();
         assert_eq!(missing, [""; 0], "docs/paper.md is out of date: run `cargo xtask paper`");

@@ -2,10 +2,11 @@
 
 use crate::figure8::Curves;
 use crate::figures::Pair;
+use crate::findings::{Findings, Scan};
 use crate::markdown::{count, fewer, percent};
 use crate::model::Recipe;
 use crate::own::Own;
-use crate::{Findings, Scan, figures, node_code, own, published, table1};
+use crate::{figures, node_table, own, published, table1};
 use tetralod::mt::MOST_TRIES;
 
 pub fn page(all: &Findings) -> String {
@@ -73,7 +74,7 @@ describe T_u, where it is, and what removes the tetrahedra of the star.
         table1::structure(&all.rows, &all.missing),
         about_table_1(all),
         about_node_code(all),
-        node_code::table(&all.rows)
+        node_table::table(&all.rows)
     )
 }
 

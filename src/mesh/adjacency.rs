@@ -1,12 +1,9 @@
 //! Who meets whom: tetrahedra across faces, and the shape of the stars of vertices.
 
 use crate::geom::Groups;
-use crate::mesh::{FACES, MeshError, NONE};
+use crate::mesh::{FACES, MAX_TETS, MeshError, NONE};
 use crate::threads;
 use std::ops::Range;
-
-/// Most tetrahedra in a mesh: its faces, four a tetrahedron, are counted in 32 bits.
-pub const MAX_TETS: usize = (1 << 30) - 1;
 
 /// One side of a face: the face of one tetrahedron. A number, for sorting: the face's vertices in increasing order, and
 /// `4 · tet + i` for face `i`.

@@ -6,6 +6,7 @@ mod cell_data;
 mod changed_blocks;
 mod check;
 mod error;
+mod field;
 mod geometry_field;
 mod grow;
 mod histogram;
@@ -16,13 +17,15 @@ mod middles;
 mod piece;
 mod repair;
 mod series;
+mod straighten;
+mod tet;
 mod tet_mesh;
 
 #[doc(hidden)]
 pub use adjacency::DisjointSets;
 #[doc(hidden)]
 pub use adjacency::{FaceTable, boundary_faces, match_faces};
-pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
+pub use adjacency::{Topology, neighbors, topology};
 #[doc(hidden)]
 pub use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
@@ -32,6 +35,7 @@ pub use check::check_arrays;
 #[doc(hidden)]
 pub use check::check_topology;
 pub use error::MeshError;
+pub use field::{Field, VectorPart};
 pub use geometry_field::GeometryField;
 #[doc(hidden)]
 pub use grow::growth_order;
@@ -42,27 +46,11 @@ pub use input::{CellNumbers, InputCell, MeshInput, Note, SourceFiles};
 pub use kuhn::kuhn_tets;
 pub use layered_grid::{GridArray, LayeredGrid};
 #[doc(hidden)]
-pub use middles::{Middles, straighten};
+pub use middles::Middles;
 pub use piece::MeshPiece;
 pub use repair::{MeshFindings, RepairLevel, RepairReport, findings, repair, repair_at};
 pub use series::StepError;
-pub use tet_mesh::{Field, Grid, TetMesh, VectorPart};
-
-/// "No tetrahedron": the neighbour across a boundary face.
-pub const NONE: u32 = u32::MAX;
-
-/// The four faces of a positive tetrahedron, face `i` opposite vertex `i`, ordered so that the right-handed
-/// normal points outward.
-///
-/// ```text
-///         3
-///        /|\          face 0: 1 2 3
-///       / | \         face 1: 0 3 2
-///      0--|--2        face 2: 0 1 3
-///       \ | /         face 3: 0 2 1
-///         1
-/// ```
-pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-
-/// The six edges of a tetrahedron.
-pub const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+#[doc(hidden)]
+pub use straighten::straighten;
+pub use tet::{EDGES, FACES, MAX_TETS, NONE};
+pub use tet_mesh::{Grid, TetMesh};

@@ -2,8 +2,13 @@
 
 use super::replay::replay;
 use super::stats::bounds;
-use super::{EdgeMt, ExplicitMt, HalfEdgeMt, MultiTessellation, ReplayError, UpdateError, VertexMt};
+use super::{
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, HalfEdgeMt,
+    LookAtTet, MtInfo, MultiTessellation, PageError, ReplayError, UpdateError, UpdateId, UpdatePages,
+    VertexMt,
+};
 use enum_dispatch::enum_dispatch;
+use std::ops::Range;
 
 /// An MT of any kind.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,6 +8,10 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ErrorCode(pub u16);
 
+/// How often the error of a tetrahedron by itself can be quartered at most ([`ErrorCode::lowered`]): it is then at least a 64th of the
+/// update's error.
+pub const MAX_QUARTERINGS: u8 = 3;
+
 /// Errors that are twice as large have a code larger by this.
 const CODES_AN_OCTAVE: u16 = 1 << 11;
 /// A 32nd of that.

@@ -1,7 +1,8 @@
 //! Views: the view frustum of a camera, and the size of errors in pixels.
 
-use super::View;
-use super::criterion::{ANY, Frame, TetData, Verdict, component_of};
+use super::criterion::{ANY, TetData, Verdict, component_of};
+use super::frame::Frame;
+use super::request::View;
 use super::shape::Plane;
 use super::tet_minimax::Rows;
 use glam::{DMat4, DVec2, DVec3, DVec4};

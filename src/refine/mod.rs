@@ -39,22 +39,28 @@ mod camera;
 mod converge;
 mod criterion;
 mod custom;
+mod frame;
 mod front;
+mod lod_criterion;
 mod look;
 mod pages;
 mod palette;
 mod quality;
 mod ranked;
+mod ranked_queues;
 mod request;
 mod shape;
+mod single_updates;
+mod steps;
 mod sweep;
 mod tet_minimax;
 mod timing_wheel;
 mod uniform;
 
-pub use criterion::{ANY, COMPONENTS, Criterion, LodCriterion, TetData, Tolerance, Verdict};
+pub use criterion::{ANY, COMPONENTS, Criterion, TetData, Tolerance, Verdict};
 pub use custom::Custom;
 pub use front::{Front, GoOn, Outcome};
+pub use lod_criterion::LodCriterion;
 pub use request::{Budget, Need, Part, Region, Request, RequestError, Transfer, Values, View};
 
 /// The most planes that a [`Region::Convex`] can have.

@@ -9,99 +9,12 @@
 //! reached: when the budget is exceeded, all updates applied since then are undone. Again the mesh is that of the
 //! smallest threshold that fits.
 
-use super::converge::{Forced, creators_of_touched};
 use super::front::{Front, GoOn, Task};
 use super::look::{TetErrors, see};
+use super::ranked_queues::{State, rank};
+use super::single_updates::{Forced, creators_of_touched};
 use crate::mt::{ApplyUpdates, UpdateError, UpdateId};
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
-/// The priority of an update: larger excess first, ties coarse to fine. Parents rank before their children.
-type Rank = (u64, Reverse<UpdateId>);
-
-/// Excesses are not negative, so their bits compare as they do.
-fn rank(excess: f64, u: UpdateId) -> Rank {
-    (excess.to_bits(), Reverse(u))
-}
-
-/// The two queues, kept between the steps to one goal.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Ranked {
-    state: State,
-    /// Violating tetrahedra by the rank of the update that removes them.
-    refinable: BinaryHeap<(Rank, u32)>,
-    /// Applied updates that may be without applied children, least excess first.
-    coarsenable: BinaryHeap<Reverse<Rank>>,
-    /// Tetrahedra that packing the mesh has moved since the last step.
-    moved: Vec<u32>,
-    /// The least rank of a forced update.
-    threshold: Option<Rank>,
-    /// The updates applied since the threshold was reached; kept only with own errors.
-    since: Vec<UpdateId>,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum State {
-    /// The queues are empty.
-    #[default]
-    Idle,
-    /// They are in use.
-    Running,
-    /// Nothing violates the criterion.
-    Satisfied,
-    /// The budget allows no more.
-    Limited,
-}
-
-impl Ranked {
-    /// Empties the queues. Keeps whether the budget sufficed for the last request: that likely holds for the next one.
-    pub fn clear(&mut self) {
-        if self.state == State::Running {
-            self.state = State::Idle;
-        }
-        self.refinable.clear();
-        self.coarsenable.clear();
-        self.moved.clear();
-        self.threshold = None;
-        self.since.clear();
-    }
-
-    /// An update of this rank is about to be forced.
-    fn reach(&mut self, rank: Rank) {
-        if self.threshold.is_none_or(|threshold| rank < threshold) {
-            self.threshold = Some(rank);
-            self.since.clear();
-        }
-    }
-
-    /// An update has been applied.
-    pub fn note_applied(&mut self, u: UpdateId) {
-        if self.threshold.is_some() {
-            self.since.push(u);
-        }
-    }
-
-    /// Tetrahedra have moved to these slots.
-    pub fn note_moved(&mut self, slots: &[u32]) {
-        if self.is_running() {
-            self.moved.extend_from_slice(slots);
-        }
-    }
-
-    pub fn is_running(&self) -> bool {
-        self.state == State::Running
-    }
-
-    /// Whether the budget sufficed for the last request, as far as is known.
-    pub fn has_room(&self) -> bool {
-        matches!(self.state, State::Idle | State::Satisfied)
-    }
-
-    pub fn bytes(&self) -> u64 {
-        let refinable = self.refinable.len() * size_of::<(Rank, u32)>();
-        (refinable + self.coarsenable.len() * size_of::<Rank>() + size_of_val(&self.since[..])) as u64
-    }
-}
 
 impl Front {
     /// Moves to the mesh of the smallest excess that fits the budget. True when that is reached.

@@ -5,12 +5,11 @@
 //! not need any more go when the memory that they may take is short.
 
 use super::Session;
-use super::pieces::Pieces;
+use super::block_state::Blocks;
 use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
 use crate::geom::Bounds;
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetData};
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -64,49 +63,12 @@ const FIRST_BYTES: u64 = 1 << 16;
 /// How many bytes are asked for at a time where the file has to be read from end to end.
 const LATER_BYTES: u64 = 1 << 20;
 
-/// The blocks of a session.
-#[derive(Debug)]
-pub(super) struct Blocks {
-    /// Bytes that blocks may take in memory.
-    memory: u64,
-    /// How far the file has been read in order.
-    fed: u64,
-    /// What has come of blocks that are not complete, by where it begins.
-    pieces: Pieces,
-    /// The beginning of a range of a block, and where that begins: it came with what stands in front of the blocks.
-    beginning: Option<(u64, Vec<u8>)>,
-    /// Complete blocks that wait for others, by number.
-    waiting: Pieces,
-    /// What is to be here, most important first, as far as there is memory for it.
-    plan: Vec<(f64, u32)>,
-    needed: u32,
-    left_out: u32,
-    /// The number of the plan in which each block was needed last.
-    last_needed: Vec<u32>,
-    plans: u32,
-    /// The criterion of the request.
-    criterion: Option<Arc<dyn Criterion>>,
-}
-
 impl Session {
     /// A session for a file that comes in parts, whose blocks may take so many bytes in memory. Files of kinds that do not come
     /// in blocks (see [`MtKind::is_paged`](crate::mt::MtKind::is_paged)) are wanted as a whole.
     pub fn in_parts(options: DecodeOptions, memory: u64) -> Self {
         let decoder = Decoder::new(DecodeOptions { in_parts: true, ..options });
-        let blocks = Blocks {
-            memory,
-            fed: 0,
-            pieces: Pieces::default(),
-            beginning: None,
-            waiting: Pieces::default(),
-            plan: Vec::new(),
-            needed: 0,
-            left_out: 0,
-            last_needed: Vec::new(),
-            plans: 0,
-            criterion: None,
-        };
-        Self { decoder, blocks: Some(blocks), ..Self::default() }
+        Self { decoder, blocks: Some(Blocks::new(memory)), ..Self::default() }
     }
 
     /// Which bytes of the file are wanted next, most important first; none when all is here that the request needs. Only for
@@ -447,45 +409,6 @@ impl Session {
             unneeded.map(|block| u64::from(age(block)) << 32 | u64::from(!block)).collect();
         keys.sort_unstable();
         keys.into_iter().map(|key| !(key as u32)).collect()
-    }
-}
-
-impl Blocks {
-    /// Bytes of what waits to be put together.
-    fn bytes_beside(&self) -> u64 {
-        let beginning = self.beginning.as_ref().map_or(0, |(_, bytes)| bytes.len() as u64);
-        self.pieces.bytes() + self.waiting.bytes() + beginning
-    }
-
-    /// What is missing of a range of a block.
-    fn rest_of(&self, range: Range<u64>) -> Range<u64> {
-        match &self.beginning {
-            Some((start, bytes)) if *start == range.start => start + bytes.len() as u64..range.end,
-            _ => range,
-        }
-    }
-
-    /// Bytes that have come, with the beginning that they continue.
-    fn with_beginning<'a>(&self, start: u64, bytes: &'a [u8]) -> (u64, Cow<'a, [u8]>) {
-        match &self.beginning {
-            Some((first, begun)) if first + begun.len() as u64 == start => {
-                (*first, Cow::Owned([begun, bytes].concat()))
-            }
-            _ => (start, Cow::Borrowed(bytes)),
-        }
-    }
-
-    /// Keeps what has come of the `ranges` of a block that goes on behind `bytes`, which begin at `start`.
-    fn keep_beginning(&mut self, ranges: &[Range<u64>], start: u64, bytes: &[u8]) {
-        let end = start + bytes.len() as u64;
-        for range in ranges.iter().filter(|range| (start..end).contains(&range.start)) {
-            let come = bytes[(range.start - start) as usize..(range.end.min(end) - start) as usize].to_vec();
-            if range.end <= end {
-                self.pieces.insert(range.start, come);
-            } else {
-                self.beginning = Some((range.start, come));
-            }
-        }
     }
 }
 

@@ -5,6 +5,7 @@
 //! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
 
 mod behind;
+mod block_state;
 mod blocks;
 mod depths;
 mod pieces;
@@ -23,7 +24,7 @@ use crate::refine::{
 };
 use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges};
 use behind::Behind;
-use blocks::Blocks;
+use block_state::Blocks;
 use depths::Depths;
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,9 +1,10 @@
 //! What a picture shows: the options that say so, and the scene that they make.
 
 use crate::needs::read_json;
+use crate::output;
 use crate::parse::{parse_bounds, parse_list, parse_number, parse_plane, parse_range, parse_share};
 use crate::query::Query;
-use crate::{output, refuse_usage};
+use crate::usage::refuse_usage;
 use anyhow::Result;
 use clap::ValueEnum;
 use clap::builder::PossibleValuesParser;

@@ -1,10 +1,12 @@
 //! How fast this machine decodes, refines, coarsens and cuts an MT, on one thread. The clock comes from outside, so
 //! that the same code runs natively and in a browser.
 
+mod clock;
 mod coherent;
 
 pub use coherent::{Coherent, Walks};
 
+use clock::timed;
 use tetralod::format::{Decoder, FormatError};
 use tetralod::mt::{Mt, MultiTessellation};
 use tetralod::refine::Request;
@@ -115,11 +117,4 @@ fn decode(bytes: &[u8]) -> Result<Option<Mt>, FormatError> {
     decoder.feed(bytes)?;
     decoder.finish()?;
     Ok(decoder.into_mt())
-}
-
-fn timed<T>(clock: &mut dyn FnMut() -> f64, time: &mut f64, work: impl FnOnce() -> T) -> T {
-    let start = clock();
-    let done = work();
-    *time = clock() - start;
-    done
 }

@@ -3,8 +3,7 @@
 use std::cell::RefCell;
 use std::path::{Component, Path, PathBuf};
 
-use crate::error::{At, ReadError, ReadReason};
-use crate::in_file;
+use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::memory::{FileBytes, MemoryLimit};
 
 /// The files of a mesh: the one that was given, and those beside it as they are read.
@@ -124,4 +123,9 @@ mod tests {
         assert_eq!(files.into_read().len(), 7);
         let _ = fs::remove_dir_all(&folder);
     }
+}
+
+/// The bytes of one file.
+pub(super) fn load<'a>(path: &Path, memory: &MemoryLimit) -> Result<FileBytes<'a>, ReadError> {
+    FilesOf::new(path, memory).load_one(path)
 }

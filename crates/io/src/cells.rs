@@ -7,31 +7,10 @@ use std::collections::BTreeMap;
 
 use crate::MemoryLimit;
 use crate::cell_shapes::{PYRAMID_14, Recipe, middles, recipe};
+use crate::cell_types::{ANY_ORDER, ANY_ORDERS, GHOST, HIDDEN, TETRAHEDRON, VERTICES, is_flat};
 use crate::error::{ReadReason, cell_name, names};
-use crate::vtu::{GHOST_CELL, HIDDEN_CELL};
+use crate::ghosts::{GHOST_CELL, HIDDEN_CELL};
 use tetralod::mesh::{BitSet, CellNumbers, Field, MeshInput};
-
-/// VTK's number for no cell at all; also that of cells which are to be left out.
-pub(super) const EMPTY: i64 = 0;
-/// And for a tetrahedron.
-pub(super) const TETRAHEDRON: i64 = 10;
-/// And for cells that say no more than that there are points.
-const VERTICES: [i64; 2] = [1, 2];
-/// And for cells without a volume: linear, quadratic, and of any order.
-const FLAT: [i64; 31] = [
-    EMPTY, HIDDEN, GHOST, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 51, 52, 53, 54, 60, 61,
-    62, 63, 68, 69, 70,
-];
-/// And for those of Bezier.
-const FLAT_BEZIER: [i64; 3] = [75, 76, 77];
-/// Numbers of our own for cells that are marked as hidden, and as those of another piece.
-pub(super) const HIDDEN: i64 = -1;
-pub(super) const GHOST: i64 = -2;
-/// VTK's number for a hexahedron of any order.
-pub(super) const LAGRANGE_HEXAHEDRON: i64 = 72;
-/// Types of any order, and a number of our own for each with its points: this times the type, and the points.
-const ANY_ORDERS: [i64; 8] = [71, 72, 73, 74, 78, 79, 80, 81];
-pub(super) const ANY_ORDER: i64 = 10_000;
 
 /// Cells of any order that are those of another type: type, points, and that one.
 const SAME_AS: [(i64, i64, i64); 12] = [
@@ -76,11 +55,6 @@ pub(super) fn are_points(types: &[i64]) -> bool {
 fn points_of_flat(kind: i64) -> Option<i64> {
     let known = [(1, 1), (3, 2), (5, 3), (8, 4), (9, 4), (21, 3), (22, 6), (23, 8), (28, 9)];
     known.iter().find(|(flat, _)| *flat == kind).map(|(_, points)| *points)
-}
-
-/// Whether a file may list cells of this type, which are then left out.
-pub(super) fn is_flat(kind: i64) -> bool {
-    FLAT.contains(&kind) || FLAT_BEZIER.contains(&kind)
 }
 
 /// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a

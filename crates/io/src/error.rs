@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::cell_shapes::PYRAMID_14;
-use crate::cells::{ANY_ORDER, GHOST, HIDDEN, is_flat};
+use crate::cell_types::{ANY_ORDER, GHOST, HIDDEN, is_flat};
 
 /// A file that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -276,4 +276,9 @@ impl tetralod::Coded for ReadError {
             | ReadReason::MissingPoint { .. } => "corrupt",
         }
     }
+}
+
+/// Names the file of an error that does not name another one.
+pub(super) fn in_file(error: ReadError, name: &str) -> ReadError {
+    if error.file.is_empty() { ReadError { file: name.to_owned(), ..error } } else { error }
 }

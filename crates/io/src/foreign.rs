@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::ReadReason;
+use crate::file_kind::{lower_extension, without_mark};
 
 /// What files of a format are, and what makes a file of them that is read.
 type Known = (&'static str, &'static str);
@@ -196,7 +197,7 @@ pub(super) fn refused_folder(path: &Path) -> ReadReason {
     let has = |file: &str| path.join(file).exists();
     let holds = |ending: &str| {
         let entries = path.read_dir().into_iter().flatten().flatten().take(1 << 10);
-        entries.map(|entry| entry.path()).any(|file| super::lower_extension(&file) == ending)
+        entries.map(|entry| entry.path()).any(|file| lower_extension(&file) == ending)
     };
     let is_foam = has("constant/polyMesh") || has("system/controlDict") || has("faces") && has("owner");
     let (what, remedy) = if is_foam {
@@ -214,7 +215,7 @@ pub(super) fn refused_folder(path: &Path) -> ReadReason {
 }
 
 fn by_content(bytes: &[u8]) -> Option<Known> {
-    let start = super::without_mark(bytes);
+    let start = without_mark(bytes);
     let head = start.get(..1 << 12).unwrap_or(start);
     let at = |range: std::ops::Range<usize>, word: &[u8]| bytes.get(range) == Some(word);
     let has = |word: &[u8]| head.windows(word.len()).any(|window| window == word);

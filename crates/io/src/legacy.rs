@@ -7,11 +7,10 @@
 use crate::cells::{CellList, Numbering};
 use crate::error::{At, ReadError, ReadReason};
 use crate::fields::{Collector, check_finite, check_finite_cells};
-use crate::image::{GridValues, Placement};
-use crate::number::NumberType;
-use crate::structured::Ghosts;
-use crate::vtu::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
-use crate::{CellData, MemoryLimit, ReadOptions, Survey, cells, image, points_from, structured};
+use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
+use crate::grid::{self, Ghosts, GridValues, Placement};
+use crate::number::{NumberType, points_from};
+use crate::{CellData, MemoryLimit, ReadOptions, Survey, cell_types, cells};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
 /// How every legacy file starts.
@@ -62,7 +61,7 @@ pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
         cells::resolve_orders(&mut body.types, &ends);
     }
     let (points, cells) = match body.dims {
-        Some(dims) => (dims.iter().fold(1_u64, |n, d| n.saturating_mul(*d)), structured::most_tets(dims)),
+        Some(dims) => (dims.iter().fold(1_u64, |n, d| n.saturating_mul(*d)), grid::most_tets(dims)),
         None if cells::are_points(&body.types) => (body.points as u64, 0),
         None => (body.points as u64, cells::most_tets(&body.types).at(|| "CELL_TYPES".into())?),
     };
@@ -684,7 +683,8 @@ impl<'a> Body<'a> {
         let mut mesh = TetMesh { positions, input: std::mem::take(&mut self.input), ..TetMesh::default() };
         if let Some(listed) = listed {
             mesh.cell_fields = self.take_cell_fields(listed.types.len()).at(|| "CELL_DATA".into())?;
-            let is_there = |cell: usize| listed.types.get(cell).is_some_and(|kind| !cells::is_flat(*kind));
+            let is_there =
+                |cell: usize| listed.types.get(cell).is_some_and(|kind| !cell_types::is_flat(*kind));
             check_finite_cells(&mesh.cell_fields, is_there).at(|| "CELL_DATA".into())?;
             let numbering = Numbering::From { first: 0, points: mesh.positions.len() };
             let split = listed.split(&numbering, &self.memory).at(|| "CELLS".into())?;
@@ -712,7 +712,7 @@ impl<'a> Body<'a> {
         }
         cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
         let ends = self.ends_of_cells(file.version).at(|| "CELLS".into())?;
-        let is_old = |kind: &i64| *kind == cells::LAGRANGE_HEXAHEDRON && file.is_before_5_1;
+        let is_old = |kind: &i64| *kind == cell_types::LAGRANGE_HEXAHEDRON && file.is_before_5_1;
         let swapped = self.types.iter().map(is_old).collect();
         cells::resolve_orders(&mut self.types, &ends);
         cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
@@ -774,10 +774,10 @@ impl<'a> Body<'a> {
     fn placement(&self) -> Result<Placement, ReadError> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| ReadReason::Missing("DIMENSIONS".into())).at(place)?;
-        structured::checked_dims(dims).at(place)?;
+        grid::checked_dims(dims).at(place)?;
         let whole = [0, dims[0] as i64 - 1, 0, dims[1] as i64 - 1, 0, dims[2] as i64 - 1];
         let spacing = self.spacing.unwrap_or([1.0; 3]);
-        let placed = image::placed(whole, self.origin, spacing, image::ALONG_THE_AXES);
+        let placed = grid::placed(whole, self.origin, spacing, grid::ALONG_THE_AXES);
         Ok(placed.at(|| "SPACING".to_owned())?.0)
     }
 
@@ -803,37 +803,37 @@ impl<'a> Body<'a> {
 
     /// A grid whose coordinates are given along each axis.
     fn rectilinear(mut self) -> Result<TetMesh, ReadError> {
-        let dims = structured::checked_dims(self.dims.unwrap_or_default()).at(|| "DIMENSIONS".to_owned())?;
+        let dims = grid::checked_dims(self.dims.unwrap_or_default()).at(|| "DIMENSIONS".to_owned())?;
         for (axis, name) in ["X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES"].into_iter().enumerate() {
             let found = self.coordinates[axis].len();
             expect("coordinates", dims[axis] as usize, found).at(|| name.to_owned())?;
         }
         let coordinates = std::mem::take(&mut self.coordinates);
-        self.expect_tuples(structured::cubes(dims))?;
-        self.memory.expect(2 * structured::bytes(dims)).at(|| "DIMENSIONS".into())?;
-        self.curvilinear(points_from(&structured::rectilinear(&coordinates)))
+        self.expect_tuples(grid::cubes(dims))?;
+        self.memory.expect(2 * grid::bytes(dims)).at(|| "DIMENSIONS".into())?;
+        self.curvilinear(points_from(&grid::rectilinear(&coordinates)))
     }
 
     /// A grid of which each point has a place of its own: these, or those of the section POINTS.
     fn curvilinear(mut self, positions: Vec<[f64; 3]>) -> Result<TetMesh, ReadError> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| missing("DIMENSIONS")).at(place)?;
-        let dims = structured::checked_dims(dims).at(place)?;
+        let dims = grid::checked_dims(dims).at(place)?;
         if !positions.is_empty() {
             self.positions = Some(positions);
         }
         let positions = self.take_positions()?;
         // As many points as there are cannot be claimed.
         self.tuples = self.tuples.max(positions.len());
-        let values = self.values(structured::cubes(dims))?;
-        structured::mesh(dims, positions, values, &self.memory).at(|| "POINTS".into())
+        let values = self.values(grid::cubes(dims))?;
+        grid::mesh(dims, positions, values, &self.memory).at(|| "POINTS".into())
     }
 
     fn structured(mut self) -> Result<TetMesh, ReadError> {
         let placement = self.placement()?;
         check_values(&self.fields, placement.dims.iter().product()).at(|| "POINT_DATA".into())?;
-        let dims = structured::checked_dims(placement.dims).at(|| "DIMENSIONS".into())?;
-        let values = self.values(structured::cubes(dims))?;
+        let dims = grid::checked_dims(placement.dims).at(|| "DIMENSIONS".into())?;
+        let values = self.values(grid::cubes(dims))?;
         placement.mesh(values, &self.memory).at(|| "POINT_DATA".into())
     }
 }

@@ -35,17 +35,25 @@
 
 mod beside;
 mod cell_shapes;
+mod cell_types;
 mod cells;
+mod contents;
 mod error;
 mod fields;
+mod file_kind;
 mod foreign;
 #[cfg(not(target_arch = "wasm32"))]
 mod formats;
 pub mod generate;
+mod ghosts;
+mod grid;
+mod grid_parts;
 mod image;
 mod legacy;
+mod listed;
 mod memory;
 mod number;
+mod options;
 mod packed;
 mod payload;
 #[cfg(not(target_arch = "wasm32"))]
@@ -64,14 +72,16 @@ mod write_layers;
 mod xml;
 mod xz;
 
+pub use contents::Survey;
 pub use error::{ReadError, ReadReason};
-pub use image::MAX_GRID_POINTS;
+pub use grid::MAX_GRID_POINTS;
 pub use memory::MemoryLimit;
+pub use options::{CellData, ReadOptions};
 #[cfg(not(target_arch = "wasm32"))]
 pub use pieces::{PieceCounts, Pieces};
 pub use pvd::{Step, steps, write_pvd};
 pub use surface::{PointValues, PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
-pub use survey::{Survey, format_of, held_bytes, survey, survey_raw};
+pub use survey::{format_of, held_bytes, survey, survey_raw};
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{PointArray, point_arrays, write_vti, write_vtu};
 pub use write_layers::write_vti_layers;
@@ -79,38 +89,12 @@ pub use write_layers::write_vti_layers;
 use std::path::Path;
 
 use crate::beside::FilesOf;
-use crate::error::At;
-use crate::memory::FileBytes;
+use crate::error::{At, in_file};
+use crate::file_kind::{lower_extension, without_gz, without_mark};
+use crate::listed::not_read;
+use crate::options::Beside;
+use crate::xml::IN_FILES;
 use tetralod::mesh::{TetMesh, straighten};
-
-/// What to read of a file.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ReadOptions {
-    /// Names of the fields to keep, a vector's name for all its components; all if none. Others are not decoded, and may be
-    /// anything: see [`MeshInput::other_fields`](tetralod::mesh::MeshInput::other_fields).
-    pub fields: Option<Vec<String>>,
-    /// Keep the first field beside those that are named, and none else if none are: the first at points, or at cells where points have
-    /// none.
-    pub first: bool,
-    /// What to do with fields at cells.
-    pub cells: CellData,
-    /// Which step to read of a file that has several (see [`Step::number`]): the first one is 0. Others have one.
-    pub step: usize,
-    /// The most memory that reading may take.
-    pub memory: MemoryLimit,
-}
-
-/// What to do with fields at cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CellData {
-    /// Leave them out.
-    #[default]
-    LeaveOut,
-    /// Keep their names alone, for messages that say how to read them.
-    Names,
-    /// Read them: see [`TetMesh::cells_to_points`].
-    Values,
-}
 
 /// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
 ///
@@ -143,7 +127,7 @@ fn settled(mut mesh: TetMesh) -> TetMesh {
 /// The same mesh with the points and tetrahedra of a grid.
 fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadReason> {
     if let Some(grid) = mesh.grid.filter(|_| mesh.is_grid_alone()) {
-        options.memory.take(structured::bytes(grid.dims))?;
+        options.memory.take(grid::bytes(grid.dims))?;
     }
     mesh.expand_grid();
     Ok(mesh)
@@ -211,9 +195,6 @@ pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Resul
     let read = read_in(name, bytes, options, &alone).map(settled)?;
     expanded(read, options).at(String::new).map_err(|e| in_file(e, name))
 }
-
-/// Gets the bytes of another file, by its path from the folder of the one that is read.
-type Beside<'a> = &'a dyn Fn(&str) -> Result<FileBytes<'static>, ReadReason>;
 
 /// Reads a file that may refer to others.
 fn read_in(
@@ -304,46 +285,6 @@ fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<T
     Ok(mesh)
 }
 
-/// What the types of documents begin with that list files with pieces.
-const IN_FILES: char = 'P';
-
-/// Reads a document with the pieces of a grid.
-type ReadFile<'a> = &'a mut dyn FnMut(&xml::Document<'_>) -> Result<(), ReadError>;
-
-/// Has `read` read the document, or the files that it lists, whose bytes count in the limit; returns the time of the first one that has one.
-fn for_each_file(
-    document: &xml::Document<'_>,
-    beside: Beside<'_>,
-    memory: &MemoryLimit,
-    read: ReadFile<'_>,
-) -> Result<Option<f64>, ReadError> {
-    if !document.kind.starts_with(IN_FILES) {
-        read(document)?;
-        return Ok(document.time());
-    }
-    read_listed(document, beside, memory, read)
-}
-
-#[cfg(not(target_arch = "wasm32"))]
-fn read_listed(
-    document: &xml::Document<'_>,
-    beside: Beside<'_>,
-    memory: &MemoryLimit,
-    read: ReadFile<'_>,
-) -> Result<Option<f64>, ReadError> {
-    pvtu::for_each_file(document, beside, memory, read)
-}
-
-#[cfg(target_arch = "wasm32")]
-fn read_listed(
-    document: &xml::Document<'_>,
-    _: Beside<'_>,
-    _: &MemoryLimit,
-    _: ReadFile<'_>,
-) -> Result<Option<f64>, ReadError> {
-    Err(not_read(&document.kind)).at(String::new)
-}
-
 /// Reads the pieces that are listed, and their time.
 #[cfg(not(target_arch = "wasm32"))]
 fn read_pieces(
@@ -361,54 +302,4 @@ fn read_pieces(
     _: Beside<'_>,
 ) -> Result<(TetMesh, Option<f64>), ReadError> {
     Err(not_read(&document.kind)).at(String::new)
-}
-
-/// Why an XML file of this type is refused.
-fn not_read(kind: &str) -> ReadReason {
-    let (what, remedy) = match kind {
-        "PolyData" | "PPolyData" => {
-            return ReadReason::NoVolume("a data set of type PolyData".into());
-        }
-        "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
-        "PUnstructuredGrid" | "PImageData" | "PRectilinearGrid" | "PStructuredGrid" => {
-            ("a list of pieces".into(), "give one of the files that it lists")
-        }
-        other => (
-            format!("a data set of type {other}"),
-            "give an UnstructuredGrid, a StructuredGrid, a RectilinearGrid or ImageData",
-        ),
-    };
-    ReadReason::Unsupported { what, remedy: remedy.into() }
-}
-
-/// The name of a file before it was packed.
-fn without_gz(name: &str) -> &str {
-    let end = name.len().wrapping_sub(3);
-    match name.get(end..) {
-        Some(ending) if ending.eq_ignore_ascii_case(".gz") => &name[..end],
-        _ => name,
-    }
-}
-
-/// XML may have a byte order mark and white space in front of it.
-fn without_mark(bytes: &[u8]) -> &[u8] {
-    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start()
-}
-
-fn load<'a>(path: &Path, memory: &MemoryLimit) -> Result<FileBytes<'a>, ReadError> {
-    FilesOf::new(path, memory).load_one(path)
-}
-
-/// Names the file of an error that does not name another one.
-fn in_file(error: ReadError, name: &str) -> ReadError {
-    if error.file.is_empty() { ReadError { file: name.to_owned(), ..error } } else { error }
-}
-
-fn lower_extension(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
-}
-
-/// Positions from three coordinates each.
-fn points_from(coordinates: &[f64]) -> Vec<[f64; 3]> {
-    coordinates.as_chunks::<3>().0.to_vec()
 }

@@ -151,3 +151,8 @@ fn not_a_number(text: &str) -> ReadReason {
     let shown: String = text.chars().take(24).collect();
     ReadReason::Syntax(format!("\"{shown}\" is not a number of the stated type"))
 }
+
+/// Positions from three coordinates each.
+pub(super) fn points_from(coordinates: &[f64]) -> Vec<[f64; 3]> {
+    coordinates.as_chunks::<3>().0.to_vec()
+}

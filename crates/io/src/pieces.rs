@@ -7,13 +7,15 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::beside::FilesOf;
+use crate::beside::load;
 use crate::cells::Numbering;
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::settle_unused;
+use crate::file_kind::without_mark;
 use crate::pvtu::{bits, for_each_file};
 use crate::vtu::{PieceReader, first_number};
 use crate::xml::Document;
-use crate::{ReadOptions, in_file, load, packed, without_mark};
+use crate::{ReadOptions, packed};
 use tetralod::mesh::{Field, MeshPiece, Middles, TetMesh};
 
 /// A mesh in several files, of which one is read at a time.

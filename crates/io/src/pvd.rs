@@ -7,12 +7,14 @@ use std::path::{Component, Path, PathBuf};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::beside::{self, load};
+use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::file_kind::{lower_extension, without_gz};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::formats;
 use crate::write::escaped;
 use crate::xml::Attributes;
-use crate::{MemoryLimit, beside, in_file, load, lower_extension, packed, without_gz};
+use crate::{MemoryLimit, packed};
 
 /// Most bytes of a list, unpacked if it is in gzip: some hundred thousand time steps.
 const MOST_BYTES: u64 = 1 << 26;

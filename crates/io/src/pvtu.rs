@@ -8,10 +8,11 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::cells::Numbering;
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::file_kind::without_mark;
 use crate::vtu::{NumberPoints, PieceReader, first_number, join};
-use crate::xml::Document;
-use crate::{Beside, IN_FILES, MemoryLimit, ReadFile, ReadOptions, in_file, packed, without_mark};
+use crate::xml::{Document, IN_FILES, ReadFile};
+use crate::{Beside, MemoryLimit, ReadOptions, packed};
 use tetralod::geom::bits_of;
 use tetralod::mesh::TetMesh;
 

@@ -8,9 +8,9 @@
 use serde_json::Value;
 
 use crate::error::ReadReason;
-use crate::image::GridValues;
+use crate::grid::{self, GridValues};
 use crate::number::NumberType;
-use crate::{MemoryLimit, Survey, image};
+use crate::{MemoryLimit, Survey};
 use tetralod::mesh::{Field, Grid, TetMesh};
 
 /// Keys that say how the samples are to be read.
@@ -65,7 +65,7 @@ impl Sidecar {
         }
         let field = text("field")?.unwrap_or("value").to_owned();
         let unit = text("unit")?.unwrap_or_default().to_owned();
-        Ok(Self { file, grid: image::checked_grid(dims, origin, spacing)?, number, big, field, unit })
+        Ok(Self { file, grid: grid::checked_grid(dims, origin, spacing)?, number, big, field, unit })
     }
 
     /// What it describes.
@@ -93,7 +93,7 @@ impl Sidecar {
             integer: self.number.is_integer(),
             ..Field::new(self.field.clone(), values)
         };
-        image::grid_mesh(self.grid, GridValues { fields: vec![field], ..GridValues::default() }, memory)
+        grid::grid_mesh(self.grid, GridValues { fields: vec![field], ..GridValues::default() }, memory)
     }
 }
 

@@ -1,58 +1,13 @@
 //! What a file contains, without its values: for questions before it is read, and for the memory that reading needs.
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::contents::Survey;
+use crate::error::{At, ReadError, in_file};
+use crate::file_kind::without_mark;
+use crate::listed::not_read;
 #[cfg(not(target_arch = "wasm32"))]
 use crate::{CellData, ReadOptions, formats};
-use crate::{MemoryLimit, foreign, image, in_file, legacy, packed, raw, structured, vtu, xml};
-use tetralod::mesh::{Field, Grid};
-
-/// What a file says that it contains. The data may be damaged even so.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Survey {
-    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, or with the feature `formats`
-    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
-    pub format: &'static str,
-    /// Its points.
-    pub points: u64,
-    /// The tetrahedra, at most, that its cells are or are split into.
-    pub cells: u64,
-    /// The grid, if it is one.
-    pub grid: Option<Grid>,
-    /// The fields at points, without values.
-    pub fields: Vec<Field>,
-    /// The fields at cells, without values.
-    pub cell_fields: Vec<Field>,
-}
-
-impl Survey {
-    /// A grid that may be turned.
-    pub(super) fn of_placement(
-        format: &'static str,
-        placement: &image::Placement,
-        fields: [Vec<Field>; 2],
-    ) -> Result<Self, ReadReason> {
-        if let Some(grid) = placement.grid()? {
-            return Ok(Self::of_grid(format, grid, fields));
-        }
-        structured::checked_dims(placement.dims)?;
-        let ([fields, cell_fields], points) = (fields, placement.dims.iter().product());
-        Ok(Self {
-            format,
-            points,
-            cells: structured::most_tets(placement.dims),
-            grid: None,
-            fields,
-            cell_fields,
-        })
-    }
-
-    /// A grid; six tetrahedra a cube.
-    pub(super) fn of_grid(format: &'static str, grid: Grid, [fields, cell_fields]: [Vec<Field>; 2]) -> Self {
-        let product =
-            |less: u64| grid.dims.iter().map(|&d| u64::from(d).saturating_sub(less)).product::<u64>();
-        Self { format, points: product(0), cells: 6 * product(1), grid: Some(grid), fields, cell_fields }
-    }
-}
+use crate::{MemoryLimit, foreign, image, legacy, packed, raw, structured, vtu, xml};
+use tetralod::mesh::Field;
 
 /// Says what is in the bytes of a file; `name` is used in errors alone. No array is decoded, so this takes little memory
 /// beside the bytes.
@@ -63,7 +18,7 @@ pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
     let unpacked =
         packed::unpacked(bytes, &MemoryLimit::default()).at(String::new).map_err(|e| in_file(e, name))?;
     let bytes = &*unpacked;
-    let start = super::without_mark(bytes);
+    let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::survey(bytes)
     } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
@@ -118,7 +73,7 @@ pub fn held_bytes(bytes: &[u8]) -> u64 {
 pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
     let head = packed::head(bytes);
     let bytes = head.as_ref();
-    let start = super::without_mark(bytes);
+    let start = without_mark(bytes);
     if bytes.starts_with(legacy::MAGIC) {
         return Some("vtk");
     }
@@ -159,6 +114,6 @@ fn survey_xml(bytes: &[u8]) -> Result<Survey, ReadError> {
         "UnstructuredGrid" => vtu::survey(&document),
         "ImageData" => image::survey(&document),
         structured::RECTILINEAR | structured::CURVILINEAR => structured::survey(&document),
-        other => Err(super::not_read(other)).at(String::new),
+        other => Err(not_read(other)).at(String::new),
     }
 }

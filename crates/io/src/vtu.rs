@@ -4,8 +4,10 @@
 use crate::cells::{CellList, Numbering};
 use crate::error::{At, ReadError, ReadReason};
 use crate::fields::{Collector, check_finite, check_finite_cells};
+use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
+use crate::number::points_from;
 use crate::xml::{Array, Document, Piece};
-use crate::{CellData, ReadOptions, Survey, cells, points_from};
+use crate::{CellData, ReadOptions, Survey, cell_types, cells};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
 /// Reads a document of type `UnstructuredGrid`. The points of different pieces stay different points.
@@ -86,7 +88,7 @@ impl PieceReader<'_, '_> {
             Some(listed) => {
                 let at_cells = self.cell_fields(cells, &fields)?;
                 check_finite_cells(&at_cells[0], |cell| {
-                    listed.types.get(cell).is_some_and(|kind| !cells::is_flat(*kind))
+                    listed.types.get(cell).is_some_and(|kind| !cell_types::is_flat(*kind))
                 })
                 .at(place)?;
                 at_cells
@@ -185,7 +187,8 @@ impl PieceReader<'_, '_> {
         let offsets = find("offsets")?;
         let ends = self.document.integers(offsets, cells).at(|| offsets.place())?;
         let is_old = self.document.is_before([2, 1]);
-        let swapped = is_old.then(|| kinds.iter().map(|kind| *kind == cells::LAGRANGE_HEXAHEDRON).collect());
+        let swapped =
+            is_old.then(|| kinds.iter().map(|kind| *kind == cell_types::LAGRANGE_HEXAHEDRON).collect());
         cells::resolve_orders(&mut kinds, &ends);
         cells::most_tets(&kinds).at(|| types.place())?;
         let length = cells::checked_ends(&kinds, &ends).at(|| offsets.place())?;
@@ -241,16 +244,6 @@ impl PieceReader<'_, '_> {
         Ok(None)
     }
 }
-
-/// Arrays at cells and points by which VTK marks what belongs to another piece, or is hidden: flags of each, and how far it is
-/// from the piece in old files.
-pub(super) const GHOST_TYPE: &str = "vtkGhostType";
-pub(super) const GHOST_LEVELS: &str = "vtkGhostLevels";
-/// The flags of cells that another piece has, and of those that are hidden or that finer ones take the place of.
-pub(super) const GHOST_CELL: i64 = 1;
-pub(super) const HIDDEN_CELL: i64 = 32 | 8;
-/// The flag of points that are hidden; so are the cells there.
-pub(super) const HIDDEN_POINT: i64 = 2;
 
 /// Whether an array is a field, not a mark of VTK's.
 fn is_field(array: &Array<'_>) -> bool {

@@ -10,6 +10,12 @@ use crate::number::NumberType;
 use crate::payload;
 use crate::payload::{Compressor, Framing, Source};
 
+/// What the types of documents begin with that list files with pieces.
+pub(super) const IN_FILES: char = 'P';
+
+/// Reads a document with the pieces of a grid.
+pub(super) type ReadFile<'a> = &'a mut dyn FnMut(&Document<'_>) -> Result<(), ReadError>;
+
 /// Deepest nesting of elements; VTK's files need eight.
 const MAX_DEPTH: usize = 32;
 

@@ -1,9 +1,9 @@
 //! The star of a vertex that is to be split, with its link numbered locally; the part of a split that looks but does
 //! not change anything.
 
-use super::store::{MAX_LINK, MAX_STAR};
 use crate::geom::orient3d;
 use crate::mesh::NONE;
+use crate::mt::mesh::limits::{MAX_LINK, MAX_STAR};
 use crate::mt::mesh::stars::{GATHERED, LINK_CAPACITY, MARK_BITS, MARK_MASK};
 use crate::mt::mesh::tet::{TURN, corner_of};
 use crate::mt::mesh::{CurrentMesh, Gather, KindState};

@@ -23,12 +23,6 @@ use crate::mt::{
 };
 use std::borrow::Cow;
 
-/// Largest number of tetrahedra around a vertex that an update splits.
-pub const MAX_STAR: usize = 64;
-
-/// Largest number of vertices around a vertex that an update splits.
-pub const MAX_LINK: usize = 32;
-
 /// Largest number of an edge of a link that an offset can be counted from: seven bits of an update's record name it. Links that
 /// close up have at most 96 edges.
 pub const MAX_EDGE: u8 = 127;

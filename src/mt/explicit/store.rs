@@ -12,9 +12,9 @@ use crate::mesh::NONE;
 use crate::mt::pages::Rows;
 use crate::mt::replay::{ReplayError, canonical, replay};
 use crate::mt::update_errors::Errors;
-use crate::mt::vertex::tet_errors::MAX_QUARTERINGS;
 use crate::mt::{
-    ApplyUpdates, BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
+    ApplyUpdates, BaseMesh, ErrorCode, MAX_QUARTERINGS, MtInfo, MtKind, MultiTessellation, UpdateError,
+    UpdateId, VertexId,
 };
 use std::collections::HashMap;
 use std::ops::Range;

@@ -1,8 +1,10 @@
 //! Updates that are about to be appended to a half-edge MT. First they are applied, one after the other, and their stars are taken down;
 //! then the stars are coded, each by itself.
 
-use super::builder::{Forest, Remover, by_corner, damaged, refused};
-use super::scratch::{MOST, NEW, NewTet, Scratch, is_positive, predict_levels};
+use super::forest::Forest;
+use super::refusal::{damaged, refused};
+use super::removers::{Remover, set_removers};
+use super::scratch::{NEW, NewTet, Scratch, is_positive, predict_levels};
 use super::star_code::StarCode;
 use super::store::{HalfEdgeMt, HalfEdgeUpdate};
 use crate::mt::facts::MtFacts;
@@ -59,6 +61,121 @@ struct Coded {
     faults: Vec<Excess>,
     /// Why the next one has no code.
     failed: Option<ConvertError>,
+}
+
+/// Scratch space for coding stars.
+#[derive(Default)]
+struct CodeScratch {
+    code: StarCode,
+    star: Vec<NewTet>,
+    parents: Vec<UpdateId>,
+    beyond: Vec<i32>,
+}
+
+impl Coded {
+    /// Without codes yet, with room for those of so many updates.
+    fn with_room(updates: usize, fields: usize) -> Self {
+        Self {
+            stars: Vec::new(),
+            ends: Vec::with_capacity(updates),
+            residuals: vec![0; updates * fields],
+            bounds: Vec::with_capacity(updates),
+            ranges: Vec::with_capacity(updates * fields),
+            faults: Vec::new(),
+            failed: None,
+        }
+    }
+
+    /// Adds the code of a star, which is the `at`-th, and what its page is to know of it.
+    fn push(
+        &mut self,
+        at: usize,
+        star: &TakenStar<'_>,
+        forest: &Forest,
+        CodeScratch { code, star: tets, .. }: &mut CodeScratch,
+    ) -> Result<(), ConvertError> {
+        let update = star.update.0;
+        if !is_positive(star.tets, star.positions(), star.position) {
+            return Err(damaged(UpdateError::Inverted { update }));
+        }
+        let fields = star.levels.len();
+        star.put_residuals(&mut self.residuals[at * fields..][..fields]);
+        tets.clear();
+        tets.extend_from_slice(star.tets);
+        let vertices = star.vertices().map(|(label, p)| (label, p, forest.children(label)));
+        code.write(star.update, tets, vertices, &mut self.stars).ok_or_else(|| refused(update))?;
+        self.ends.push(self.stars.len());
+        self.bounds.push(star.bounds());
+        self.ranges.extend(star.ranges());
+        Ok(())
+    }
+}
+
+/// The star of an update that has been applied, with its link.
+struct TakenStar<'a> {
+    update: UpdateId,
+    /// The vertex that it inserts, with its position and its levels.
+    vertex: u32,
+    position: [i32; 3],
+    levels: &'a [i32],
+    tets: &'a [NewTet],
+    /// How many tetrahedra it has removed; the first of `tets` took their slots.
+    removed: usize,
+    /// The labels of the vertices of the link and where these are; the near vertex is the first.
+    link: &'a [(u32, [i32; 3])],
+    /// Their levels, vertex by vertex and field by field.
+    link_levels: &'a [i32],
+}
+
+impl<'a> TakenStar<'a> {
+    /// The levels of the `v`-th vertex of the link.
+    #[inline]
+    fn levels_at(&self, v: usize) -> &'a [i32] {
+        let fields = self.levels.len();
+        &self.link_levels[v * fields..][..fields]
+    }
+
+    /// Where the vertices of the link are.
+    fn positions(&self) -> impl Iterator<Item = [i32; 3]> + Clone + 'a {
+        self.link.iter().map(|v| v.1)
+    }
+
+    /// The labels of the vertices of the link and of the new one, which comes last, and where these are.
+    fn vertices(&self) -> impl Iterator<Item = (u32, [i32; 3])> + Clone + 'a {
+        self.link.iter().copied().chain([(self.vertex, self.position)])
+    }
+
+    /// What created each tetrahedron that the update has removed, and the levels at its corners: those of the one that took its slot, with
+    /// the near vertex in place of the new one.
+    fn removed(&self, mt: &HalfEdgeMt) -> impl Iterator<Item = (Option<UpdateId>, [&'a [i32]; 4])> + Clone {
+        self.tets[..self.removed].iter().map(|new| {
+            let corners = new.corners.map(|c| if c == NEW { 0 } else { usize::from(c) });
+            let newest = corners.iter().map(|&c| self.link[c].0).max();
+            (newest.and_then(|v| mt.inserted_by(VertexId(v))), corners.map(|c| self.levels_at(c)))
+        })
+    }
+
+    /// Writes, field by field, what is to be added to the predicted level of the new vertex.
+    fn put_residuals(&self, residuals: &mut [i32]) {
+        let link = self.positions().enumerate().map(|(v, p)| (p, self.levels_at(v)));
+        predict_levels(link, self.position, residuals);
+        residuals.iter_mut().zip(self.levels).for_each(|(residual, level)| *residual = level - *residual);
+    }
+
+    /// The box around the star.
+    fn bounds(&self) -> [[i32; 3]; 2] {
+        self.vertices().fold([[i32::MAX; 3], [i32::MIN; 3]], |[low, high], (_, p)| {
+            [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+        })
+    }
+
+    /// The range of the levels of its vertices, field by field.
+    fn ranges(&self) -> impl Iterator<Item = [i32; 2]> {
+        (0..self.levels.len()).map(|f| {
+            let around = (0..self.link.len()).map(|v| self.levels_at(v)[f]);
+            around.fold([self.levels[f]; 2], |[low, high], level| [low.min(level), high.max(level)])
+        })
+    }
 }
 
 impl Batch {
@@ -190,6 +307,7 @@ impl Batch {
         CodedBatch(threads::map(self.applied.len(), SHARE, code))
     }
 
+    /// Codes the stars of some of the updates that have been applied, up to the first that has no code.
     fn code_share(
         &self,
         updates: Range<usize>,
@@ -197,67 +315,54 @@ impl Batch {
         forest: &Forest,
         margins: &Margins,
     ) -> Coded {
+        let mut coded = Coded::with_room(updates.len(), mt.info().fields.len());
+        let mut scratch = CodeScratch::default();
+        for (at, i) in updates.enumerate() {
+            let star = self.star_of(i, mt);
+            coded.faults.extend(self.fault(&star, mt, margins, &mut scratch));
+            if let Err(why) = coded.push(at, &star, forest, &mut scratch) {
+                coded.failed = Some(why);
+                break;
+            }
+        }
+        coded
+    }
+
+    /// The star of the `i`-th update, as it was taken down.
+    fn star_of(&self, i: usize, mt: &HalfEdgeMt) -> TakenStar<'_> {
         let fields = mt.info().fields.len();
-        let mut coded = Coded {
-            stars: Vec::new(),
-            ends: Vec::with_capacity(updates.len()),
-            residuals: vec![0; updates.len() * fields],
-            bounds: Vec::with_capacity(updates.len()),
-            ranges: Vec::with_capacity(updates.len() * fields),
-            faults: Vec::new(),
-            failed: None,
-        };
-        let (mut code, mut star) = (StarCode::default(), Vec::new());
-        let (mut parents, mut beyond) = (Vec::new(), Vec::new());
-        // Of this batch, and before.
+        let update = UpdateId(self.first + i as u32);
+        let [star, link] = self.ranges(i);
+        TakenStar {
+            update,
+            vertex: mt.vertex(update).0,
+            position: self.applied[i].position,
+            levels: self.levels_of(i, fields),
+            tets: &self.star[star],
+            removed: self.applied[i].removed,
+            link: &self.link[link.clone()],
+            link_levels: &self.link_levels[link.start * fields..link.end * fields],
+        }
+    }
+
+    /// The fault of the errors of an update against those of its parents, of this batch or before.
+    fn fault(
+        &self,
+        star: &TakenStar<'_>,
+        mt: &HalfEdgeMt,
+        margins: &Margins,
+        scratch: &mut CodeScratch,
+    ) -> Option<Excess> {
+        let CodeScratch { parents, beyond, .. } = scratch;
+        parents.clear();
+        beyond.clear();
+        margins.find_beyond(star.removed(mt), parents, beyond);
+        let fields = star.levels.len();
         let error = |UpdateId(u): UpdateId, field: usize| match u.checked_sub(self.first) {
             Some(i) => self.errors_of(i as usize, fields)[field],
             None => mt.error_of_field(UpdateId(u), field),
         };
-        for (at, i) in updates.enumerate() {
-            let u = UpdateId(self.first + i as u32);
-            let (vertex, position) = (mt.vertex(u).0, self.applied[i].position);
-            let [star_range, link] = self.ranges(i);
-            star.clear();
-            star.extend_from_slice(&self.star[star_range]);
-            let levels_at = |v: usize| &self.link_levels[(link.start + v) * fields..][..fields];
-            let link = &self.link[link.clone()];
-            // What it removes has the near vertex in place of the new one.
-            let corners = |new: &NewTet| new.corners.map(|c| if c == NEW { 0 } else { usize::from(c) });
-            let tets = star[..self.applied[i].removed].iter().map(|new| {
-                let corners = corners(new);
-                let newest = corners.iter().map(|&c| link[c].0).max();
-                (newest.and_then(|v| mt.inserted_by(VertexId(v))), corners.map(levels_at))
-            });
-            parents.clear();
-            beyond.clear();
-            margins.find_beyond(tets, &mut parents, &mut beyond);
-            coded.faults.extend(margins.fault(u, &parents, &beyond, error));
-            if !is_positive(&star, link.iter().map(|v| v.1), position) {
-                coded.failed = Some(damaged(UpdateError::Inverted { update: u.0 }));
-                break;
-            }
-            let levels = self.levels_of(i, fields);
-            let residuals = &mut coded.residuals[at * fields..][..fields];
-            let positions = link.iter().map(|v| v.1);
-            predict_levels(positions.enumerate().map(|(v, p)| (p, levels_at(v))), position, residuals);
-            residuals.iter_mut().zip(levels).for_each(|(residual, level)| *residual = level - *residual);
-            let vertices = link.iter().copied().chain([(vertex, position)]);
-            let with_children = vertices.clone().map(|(label, p)| (label, p, forest.children(label)));
-            if code.write(u, &mut star, with_children, &mut coded.stars).is_none() {
-                coded.failed = Some(refused(u.0));
-                break;
-            }
-            coded.ends.push(coded.stars.len());
-            coded.bounds.push(vertices.fold([[i32::MAX; 3], [i32::MIN; 3]], |[low, high], (_, p)| {
-                [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
-            }));
-            coded.ranges.extend((0..fields).map(|f| {
-                let around = (0..link.len()).map(|v| levels_at(v)[f]);
-                around.fold([levels[f]; 2], |[low, high], level| [low.min(level), high.max(level)])
-            }));
-        }
-        coded
+        margins.fault(star.update, parents, beyond, error)
     }
 
     /// Appends what has been coded to the MT.
@@ -296,55 +401,4 @@ pub(super) struct CodedBatch(Vec<Coded>);
 /// Where the one before ends.
 fn before(i: usize, end: impl Fn(usize) -> usize) -> usize {
     i.checked_sub(1).map_or(0, end)
-}
-
-/// Enters what removes the tetrahedra of a star, given in the order of their faces opposite the new vertex. None if there are not as many of
-/// them, or these are not the given faces.
-fn set_removers(
-    scratch: &mut Scratch,
-    mesh: &CurrentMesh,
-    names: &[u32],
-    vertex: VertexId,
-    (removers, given): (&[Remover], &[[u32; 3]]),
-) -> Option<()> {
-    let Scratch { star, star_len, link, link_len, .. } = scratch;
-    let (star, link) = (&mut star[..*star_len], &link[..*link_len]);
-    if removers.len() != star.len() {
-        return None;
-    }
-    // Names are compared once for each vertex: the rest goes by ranks.
-    let name = |v: VertexId| u64::from(names[v.0 as usize]);
-    let mut sorted = [0; MOST + 1];
-    let sorted = &mut sorted[..=link.len()];
-    for (entry, (i, &slot)) in sorted.iter_mut().zip((0..).zip(link)) {
-        *entry = name(mesh.vertex(slot)) << 8 | i;
-    }
-    sorted[link.len()] = name(vertex) << 8 | u64::from(NEW);
-    sorted.sort_unstable();
-    let mut ranks = [0_u8; NEW as usize + 1];
-    (0..).zip(&*sorted).for_each(|(rank, &entry)| ranks[usize::from(entry as u8)] = rank);
-    let mut faces = [0_u32; MOST];
-    let faces = &mut faces[..star.len()];
-    for (i, (face, new)) in faces.iter_mut().zip(&*star).enumerate() {
-        let mut corners = new.corners.map(|corner| ranks[usize::from(corner)]);
-        // The new vertex goes to the end.
-        corners[usize::from(new.own) & 3] = u8::MAX;
-        corners.sort_unstable();
-        corners[3] = i as u8;
-        *face = u32::from_be_bytes(corners);
-    }
-    faces.sort_unstable();
-    for (at, (&face, &(remover, inner))) in faces.iter().zip(removers).enumerate() {
-        let [a, b, c, i] = face.to_be_bytes();
-        if let Some(given) = given.get(at) {
-            let name = |rank: u8| (sorted[usize::from(rank)] >> 8) as u32;
-            if *given != [a, b, c].map(name) {
-                return None;
-            }
-        }
-        let new = &mut star[usize::from(i)];
-        new.remover = remover;
-        new.inner = by_corner(inner, new.corners.map(|corner| u32::from(ranks[usize::from(corner)])));
-    }
-    Some(())
 }

@@ -4,83 +4,20 @@
 //! are some. Batches do not depend on how many there are.
 
 use super::batch::Batch;
+#[doc(hidden)]
+pub use super::forest::Forest;
+use super::refusal::{damaged, refused};
+use super::removers::Remover;
 use super::scratch::Scratch;
 use super::store::{BaseMark, ForestChild, HalfEdgeMt};
 use crate::mt::facts::{MtFacts, level_volumes};
 use crate::mt::{
     ApplyUpdates, BaseMesh, ConvertError, CurrentMesh, ErrorCode, Margins, MtInfo, MultiTessellation,
-    ReplayError, UpdateError,
 };
 use crate::threads;
 
-const NOT_HALF_EDGE: &str = "it is not the inverse of a half-edge collapse";
-
 /// Updates of a batch.
 const BATCH: usize = 1024;
-
-/// The update is no inverse half-edge collapse.
-pub(super) fn refused(update: u32) -> ConvertError {
-    ConvertError::Update { update, why: NOT_HALF_EDGE }
-}
-
-pub(super) fn damaged(error: UpdateError) -> ConvertError {
-    ConvertError::Damaged(ReplayError::Update(error))
-}
-
-/// What removes a tetrahedron, [`NONE`](crate::mesh::NONE) if nothing does, and which of its faces go with it (see [`BaseMark`]): bit `i` is
-/// that of the face opposite the `i`-th vertex in ascending order.
-pub(crate) type Remover = (u32, u8);
-
-/// Bits of the vertices of a tetrahedron in ascending order, by its corners.
-#[doc(hidden)]
-pub fn by_corner(bits: u8, tet: [u32; 4]) -> u8 {
-    let rank = |v: u32| tet.iter().filter(|&&other| other < v).count();
-    (0..4).fold(0, |all, corner| all | (bits >> rank(tet[corner]) & 1) << corner)
-}
-
-/// The updates by near vertex.
-#[doc(hidden)]
-pub struct Forest {
-    /// Where those of each vertex begin, and one more.
-    starts: Vec<u32>,
-    children: Vec<ForestChild>,
-    /// The near vertex of each update.
-    near: Vec<u32>,
-}
-
-impl Forest {
-    /// Of so many vertices, given the near vertex of each update, and how far from it each inserts its own.
-    pub fn new(vertices: usize, near: Vec<u32>, offset: impl Fn(u32) -> [i32; 3]) -> Self {
-        let mut starts = vec![0_u32; vertices + 1];
-        near.iter().for_each(|&v| starts[v as usize + 1] += 1);
-        (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
-        let mut next = starts.clone();
-        let mut children = vec![ForestChild::default(); near.len()];
-        for (update, &v) in (0..).zip(&near) {
-            let place = &mut next[v as usize];
-            children[*place as usize] = ForestChild { update, offset: offset(update) };
-            *place += 1;
-        }
-        Self { starts, children, near }
-    }
-
-    /// The updates whose near vertex is this one, ascending.
-    pub(super) fn children(&self, vertex: u32) -> &[ForestChild] {
-        let [start, end] = [0, 1].map(|k| self.starts.get(vertex as usize + k).map_or(0, |&at| at as usize));
-        self.children.get(start..end).unwrap_or(&[])
-    }
-
-    pub(super) fn near(&self, update: u32) -> Option<u32> {
-        self.near.get(update as usize).copied()
-    }
-
-    /// How far from its near vertex an update inserts its own.
-    pub(super) fn offset(&self, update: u32, near: u32) -> Option<[i32; 3]> {
-        let children = self.children(near);
-        let at = children.binary_search_by_key(&update, |child| child.update).ok()?;
-        Some(children[at].offset)
-    }
-}
 
 /// The next update.
 #[doc(hidden)]

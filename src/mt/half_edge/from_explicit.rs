@@ -1,6 +1,9 @@
 //! From an explicit MT to the compact half-edge one, where every update inserts a vertex that collapses onto a neighbour.
 
-use super::builder::{Forest, HalfEdgeBuilder, NextUpdate, by_corner, refused};
+use super::builder::{HalfEdgeBuilder, NextUpdate};
+use super::forest::Forest;
+use super::refusal::refused;
+use super::removers::by_corner;
 use super::store::{BaseMark, HalfEdgeMt};
 use crate::mesh::NONE;
 use crate::mt::{ConvertError, ExplicitMt, MtInfo, MtKind, MultiTessellation, UpdateId, VertexId};

@@ -134,7 +134,7 @@ impl CurrentMesh {
         // What a file says of its counts does not size the lists: no update inserts more than this.
         let updates = info.updates as usize;
         let vertices = self.labels.len().saturating_add(updates);
-        let tets = self.tets.len().saturating_add(updates.saturating_mul(crate::mt::MAX_STAR));
+        let tets = self.tets.len().saturating_add(updates.saturating_mul(super::limits::MAX_STAR));
         let tets = tets.min(info.tetrahedra as usize);
         make_room(&mut self.labels, vertices);
         make_room(&mut self.positions, vertices);

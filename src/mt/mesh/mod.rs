@@ -2,6 +2,7 @@
 
 pub(super) mod base;
 pub(super) mod current;
+pub(super) mod limits;
 pub(super) mod paged_array;
 pub(super) mod stars;
 mod tags;

@@ -29,8 +29,8 @@ pub(crate) enum Gather<T> {
     Stopped(T),
 }
 
-/// Largest star that is gathered: the two sides of a collapse have at most `MAX_STAR` tetrahedra together, and at
-/// most `MAX_LINK` more lie between them.
+/// Largest star that is gathered: the two sides of a collapse have at most [`MAX_STAR`](super::limits::MAX_STAR) tetrahedra together, and at
+/// most [`MAX_LINK`](super::limits::MAX_LINK) more lie between them.
 pub(crate) const GATHERED: usize = 128;
 /// Most vertices that are numbered.
 pub(in crate::mt) const LINK_CAPACITY: usize = GATHERED;

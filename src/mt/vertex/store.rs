@@ -29,10 +29,11 @@
 use super::bit_string::{Bits, width_of};
 use super::growing::Growing;
 use super::limits::{COUNT_BITS, MAX_INSERTED, MAX_REMOVED};
-use super::tet_errors::MAX_QUARTERINGS;
 use crate::mesh::NONE;
 use crate::mt::update_errors::Errors;
-use crate::mt::{BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId};
+use crate::mt::{
+    BaseMesh, ErrorCode, MAX_QUARTERINGS, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
+};
 
 /// A member of a loop, and which of its links leads on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,9 +6,7 @@
 //! the vertex is removed they come back.
 
 use super::limits::MAX_REMOVED;
-
-/// The largest number: at most a 64th of the update's error.
-pub const MAX_QUARTERINGS: u8 = 3;
+use crate::mt::MAX_QUARTERINGS;
 
 /// Bits of such a number.
 pub(in crate::mt) const QUARTERING_BITS: u32 = 2;

@@ -3,12 +3,14 @@
 //! The terms are always added in the order of the tetrahedra, whichever way they are found, so that a gradient
 //! depends on the mesh alone to the last bit.
 
-use super::NO_NORMAL;
 use crate::mesh::NONE;
 use crate::view::MeshView;
 use crate::view::marching::{Crossing, select};
 use crate::view::mesh_snapshot::MeshSnapshot;
 use glam::DVec3;
+
+/// In place of an undefined normal.
+pub(super) const NO_NORMAL: [f32; 3] = [0.0; 3];
 
 /// Gradients of some of the points.
 #[derive(Clone, Debug, Default)]

@@ -27,7 +27,7 @@ use super::{MeshView, SurfaceChanges};
 use crate::mesh::BLOCK;
 use block_ranges::BlockRanges;
 use glam::DVec3;
-use gradients::{Gradients, unit};
+use gradients::{Gradients, NO_NORMAL, unit};
 
 /// What the normals of a surface are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -248,9 +248,6 @@ fn is_cut(inside: [u8; 4]) -> bool {
 fn fraction(crossing: &Crossing, mesh: &MeshView<'_>, value: f64) -> f64 {
     crossing.fraction(value, |end| mesh.field[end as usize])
 }
-
-/// In place of an undefined normal.
-const NO_NORMAL: [f32; 3] = [0.0; 3];
 
 /// The normal of a vertex that has no other.
 const UP: [f32; 3] = [0.0, 0.0, 1.0];

@@ -1,6 +1,7 @@
 //! Filling a hole by contracting an edge: all that was at its one end moves to the other, which stays where it is.
 
-use crate::change::hole::{FaceSet, Filling, Hole};
+use crate::change::hole::{Filling, Hole};
+use crate::change::sides::FaceSet;
 use crate::change::work_mesh::{LARGEST_STAR, StarTet, TetSet, WorkMesh};
 use tetralod::mesh::NONE;
 

@@ -1,7 +1,7 @@
 //! The hole that a vertex leaves when it is removed, what fills it, and how a filling is put into the mesh.
 
 use crate::change::collapse_check::Refusal;
-use crate::change::sides::Sides;
+use crate::change::sides::{FaceSet, Sides};
 use crate::change::work_mesh::{ELSEWHERE, StarTet, TetSet, WorkMesh};
 use crate::geometry::flat::{Feature, Planes};
 use tetralod::geom::orient3d;
@@ -44,9 +44,6 @@ pub(crate) struct Hole {
     pub sorted: Vec<u8>,
     seen: TetSet,
 }
-
-/// A set of faces of a hole: bit `i` is that of the `i`-th.
-pub(crate) type FaceSet = u64;
 
 const _: () = assert!(MAX_HOLE <= FaceSet::BITS as usize);
 

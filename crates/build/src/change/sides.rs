@@ -1,10 +1,11 @@
 //! On which side of the faces of a hole points lie, exactly.
 
-use crate::change::hole::FaceSet;
-
 /// Where points are at most 2^SHORT_BITS apart along each axis, floating-point numbers are exact: normals are then below 2^35, and
 /// sums of their products with positions below 2^53.
 const SHORT_BITS: u32 = 16;
+
+/// A set of faces of a hole: bit `i` is that of the `i`-th.
+pub(crate) type FaceSet = u64;
 
 /// The planes of faces.
 #[derive(Default)]

@@ -1,13 +1,14 @@
 //! The exact error of a removal: what the field and the boundary lose when a hole is filled, at every reference vertex
 //! concerned.
 //!
-//! Buckets are those of [`crate::error::cost`]. A removal takes points from tetrahedra that it removes to tetrahedra that it
+//! Buckets are those of [`crate::error::reference`]. A removal takes points from tetrahedra that it removes to tetrahedra that it
 //! makes; all other tetrahedra keep theirs, and their errors.
 
 use crate::change::hole::{Filling, Hole};
-use crate::error::cost::{Buckets, Reference, largest};
+use crate::error::cost::largest;
 use crate::error::placement::{Placement, Replacement};
 use crate::error::points::{SLACK, bounds};
+use crate::error::reference::{Buckets, Reference};
 use glam::DVec3;
 use tetralod::mesh::NONE;
 use tetralod::mt::ErrorCode;

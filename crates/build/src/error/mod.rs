@@ -6,3 +6,4 @@ pub(crate) mod fill_cost;
 pub(crate) mod outside_points;
 pub(crate) mod placement;
 pub(crate) mod points;
+pub(crate) mod reference;

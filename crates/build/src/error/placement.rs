@@ -1,7 +1,7 @@
 //! Where the points of replaced tetrahedra go, and the errors there: the common part of collapses and removals.
 
-use crate::error::cost::{Buckets, Reference};
 use crate::error::points::{SLACK, barycentric, clamped};
+use crate::error::reference::{Buckets, Reference};
 use glam::{DMat3, DVec3};
 use tetralod::geom::nearest_on_triangle;
 

@@ -3,6 +3,7 @@
 use super::expected::{hash_of_tet, hashes_of_vertices};
 use super::mesh_checks::{PlainMesh, PlainReference};
 use super::parts::{Ask, change, is_aside};
+use super::report::{Failures, Measured};
 use super::surfaces::{Comparison, Distances, Surface};
 use foldhash::HashMap;
 use glam::DVec3;
@@ -42,16 +43,6 @@ struct Inside {
     /// The interpolated values, as fractions of each field's range: `shown[i * fields + f]`.
     shown: Vec<f64>,
 }
-
-/// What was found.
-pub struct Measured {
-    /// The largest error as a fraction of what is allowed.
-    pub worst_ratio: f64,
-    pub failures: Vec<String>,
-}
-
-/// Failures of one kind that are described for each query.
-const DESCRIBED: usize = 3;
 
 /// Refuses an input of another size than that of the MT.
 pub fn check_counts(info: &MtInfo, input: &TetMesh) -> Result<(), String> {
@@ -405,29 +396,6 @@ impl Look<'_> {
 /// What a vertex with this level shows, as a fraction of the field's range.
 fn shown_at((field, &level): (&FieldInfo, &i32)) -> f64 {
     field.value(level) / field.range()
-}
-
-/// Failures of one kind: the first ones in full, and their number.
-#[derive(Default)]
-pub struct Failures {
-    described: Vec<String>,
-    count: usize,
-}
-
-impl Failures {
-    pub fn add(&mut self, describe: impl FnOnce() -> String) {
-        self.count += 1;
-        if self.count <= DESCRIBED {
-            self.described.push(describe());
-        }
-    }
-
-    pub fn end(mut self, where_: &str, found: &mut Measured) {
-        if self.count > DESCRIBED {
-            self.described.push(format!("so at {} {where_}", self.count));
-        }
-        found.failures.append(&mut self.described);
-    }
 }
 
 /// The boundary of an extracted mesh.

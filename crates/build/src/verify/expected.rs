@@ -1,11 +1,15 @@
 //! What the mesh of a request must be, by the definition alone: from a list of all tetrahedra of the MT, without refinement.
 
-use super::{Query, satisfy};
+use super::fronts::satisfy;
+use super::queries::Query;
 use tetralod::mesh::BitSet;
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, MultiTessellation, UpdateId, VertexId, mix,
 };
 use tetralod::refine::{Criterion, Front, TetData};
+
+/// A mesh that is not a function of the request alone.
+pub const NOT_EXPECTED: &str = "the mesh is not that of the updates which the request needs";
 
 /// All tetrahedra and updates of an MT, and hashes of its meshes: sums of those of their tetrahedra.
 pub struct Expected {

@@ -1,8 +1,9 @@
 //! Checks that the mesh of a request does not depend on earlier requests, with many requests.
 
-use super::expected::{self, Expected};
-use super::queries::{parallel, perspective, place};
-use super::{NOT_EXPECTED, Query, VerifyReport, note, satisfy};
+use super::expected::{self, Expected, NOT_EXPECTED};
+use super::fronts::satisfy;
+use super::queries::{Query, parallel, perspective, place};
+use super::report::{VerifyReport, note};
 use glam::DVec3;
 use tetralod::geom::Bounds;
 use tetralod::mesh::TetMesh;

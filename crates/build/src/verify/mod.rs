@@ -30,58 +30,37 @@
 //!
 //! [`run_shown`] checks what a session makes of its meshes.
 
+mod case;
 mod deviation;
 mod expected;
+mod fronts;
 mod history;
 mod mesh_checks;
 mod parts;
 mod points;
 mod queries;
+mod report;
 mod same;
 mod samples;
 mod shown;
 mod surfaces;
 
+pub use report::{MAX_FAILURES, VerifyReport};
 pub use samples::{SampleRequest, run_request, samples};
 pub use shown::run_shown;
 
-use deviation::{Deviation, TetErrors};
-use expected::Expected;
+use case::{Case, check_budget};
+use deviation::Deviation;
+use expected::{Expected, NOT_EXPECTED};
+use fronts::{fresh, satisfy};
 use history::Numbers;
 use mesh_checks::PlainMesh;
 use queries::Query;
-use serde::Serialize;
+use report::note;
 use std::sync::Arc;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{ApplyUpdates, ErrorCode, check_errors};
-use tetralod::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetData};
-
-/// The result of a verification.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct VerifyReport {
-    /// Whether all checks passed.
-    pub valid: bool,
-    /// Requests that were made and checked.
-    pub queries: u32,
-    /// The largest measured error as a fraction of the guaranteed one; at most 1 if the guarantee holds.
-    pub worst_error_ratio: f64,
-    /// Failed checks: the request, the place and the numbers. At most [`MAX_FAILURES`].
-    pub failures: Vec<String>,
-}
-
-impl VerifyReport {
-    /// Adds what other checks of the same MT have found.
-    pub fn add(&mut self, other: Self) {
-        self.valid &= other.valid;
-        self.queries += other.queries;
-        self.worst_error_ratio = self.worst_error_ratio.max(other.worst_error_ratio);
-        self.failures.extend(other.failures);
-        self.failures.truncate(MAX_FAILURES);
-    }
-}
-
-/// No more failures than this are described.
-pub const MAX_FAILURES: usize = 50;
+use tetralod::refine::{Front, Outcome, Request};
 
 /// What the reference mesh of an MT has in common with the input that it was built from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -241,9 +220,6 @@ fn verify<M: ApplyUpdates>(
     history::check(mt, &expected, fronts, histories, &mut |i| on_progress(first + i, steps), report)
 }
 
-/// A mesh that is not a function of the request alone.
-const NOT_EXPECTED: &str = "the mesh is not that of the updates which the request needs";
-
 /// All numbers below `count`, neighbours far apart.
 fn mixed(count: usize) -> impl Iterator<Item = usize> {
     let stride = (count / 3..).find(|&s| s > 0 && coprime(s, count)).unwrap_or(1);
@@ -263,21 +239,6 @@ fn check_monotone(queries: &[Query], excesses: &[f64], report: &mut VerifyReport
                 note(report, large, &format!("an excess of {more}, but one of {less} with a smaller budget"));
             }
         }
-    }
-}
-
-fn fresh(mt: &impl ApplyUpdates) -> Result<Front, String> {
-    Front::new(mt).map_err(|error| format!("the base mesh: {error}"))
-}
-
-fn satisfy(mt: &impl ApplyUpdates, front: &mut Front, query: &Query) -> Result<Outcome, String> {
-    let outcome = front.satisfy(mt, &query.criterion(mt.info()), query.request.budget);
-    outcome.map_err(|error| format!("{query}: the MT is damaged: {error}"))
-}
-
-fn note(report: &mut VerifyReport, place: &dyn std::fmt::Display, failure: &str) {
-    if report.failures.len() < MAX_FAILURES {
-        report.failures.push(format!("{place}: {failure}"));
     }
 }
 
@@ -373,133 +334,9 @@ impl<M: ApplyUpdates> Walk<'_, M> {
     }
 }
 
-fn check_budget(query: &Query, mesh: &PlainMesh<'_>, base: &Front) -> Result<(), String> {
-    let (vertices, tets) = (mesh.positions.len(), mesh.tets.len());
-    let is_base = tets == base.mesh().tet_count() && vertices == base.mesh().vertex_count();
-    if is_base || query.request.budget.holds(vertices, tets) {
-        return Ok(());
-    }
-    Err(format!("{tets} tetrahedra and {vertices} vertices, more than the budget and the base mesh"))
-}
-
 fn coprime(mut a: usize, mut b: usize) -> bool {
     while b != 0 {
         (a, b) = (b, a % b);
     }
     a == 1
-}
-
-/// One query and its answer.
-struct Case<'a, M> {
-    mt: &'a M,
-    query: &'a Query,
-    front: &'a Front,
-    outcome: &'a Outcome,
-}
-
-/// The mesh that a query was answered with, and what its MT tells of it.
-struct Told<'a> {
-    mesh: &'a PlainMesh<'a>,
-    errors: &'a TetErrors,
-}
-
-/// Errors that are smaller than this, in whatever unit, are judged as this: ratios to 0 mean nothing.
-const LEAST: f64 = 1.0 / (1_u64 << 20) as f64;
-
-impl<M: ApplyUpdates> Case<'_, M> {
-    fn check(
-        &self,
-        base: &Front,
-        reference: &mesh_checks::Shape,
-        deviation: &mut Deviation<'_>,
-        report: &mut VerifyReport,
-    ) {
-        let mesh = PlainMesh::of(self.front.mesh());
-        // Without a valid mesh there is nothing to measure.
-        if let Err(failure) = mesh.check(reference) {
-            return note(report, self.query, &failure);
-        }
-        let errors = TetErrors::of(self.mt, mesh.mesh);
-        let told = Told { mesh: &mesh, errors: &errors };
-        let checks = [self.check_answer(&told), check_budget(self.query, &mesh, base)];
-        checks.iter().filter_map(|c| c.as_ref().err()).for_each(|failure| note(report, self.query, failure));
-        let needs = &self.query.request.needs;
-        let bounds: Vec<f64> = needs.iter().map(|need| self.bound(need, &told)).collect();
-        let asks = deviation.asks(needs, &bounds);
-        let measured = deviation.measure(&mesh, &errors, &asks);
-        report.worst_error_ratio = report.worst_error_ratio.max(measured.worst_ratio);
-        measured.failures.iter().for_each(|failure| note(report, self.query, failure));
-    }
-
-    /// What is guaranteed where a need counts, in its unit.
-    fn bound(&self, need: &Need, told: &Told<'_>) -> f64 {
-        let reported = self.outcome.error.error();
-        match need.part {
-            Part::View(_) | Part::Transfer(_) => {
-                if self.outcome.satisfied {
-                    return need.error;
-                }
-                let judged = Need { error: need.error.max(LEAST), ..need.clone() };
-                judged.error * self.largest(told, judged.into()).1
-            }
-            _ if self.outcome.satisfied => reported.min(need.error),
-            _ if self.query.request.needs.len() == 1 => reported,
-            _ => self.largest(told, need.clone().into()).0.max(ErrorCode::at_most(need.error)).error(),
-        }
-    }
-
-    /// The largest error and the largest excess of all tetrahedra that violate a request; 0 and 1 if none does.
-    fn largest(&self, told: &Told<'_>, request: Request) -> (ErrorCode, f64) {
-        let criterion = LodCriterion::new(self.mt.info(), &request);
-        let mut largest = (ErrorCode::ZERO, 1.0);
-        for (t, tet) in (0..).zip(told.mesh.tets) {
-            let Some(update) = told.errors.remover(t) else { continue };
-            let corners = tet.map(|v| told.mesh.positions[v as usize]);
-            let levels = |field: usize| tet.map(|v| told.mesh.mesh.levels(v)[field]);
-            let errors = told.errors.of_tet(t);
-            let error = errors.iter().max().copied().unwrap_or_default();
-            let look = TetData { corners: &corners, levels: &levels, error, errors, update };
-            // What it exceeds by costs more, and is asked for only where it exceeds at all.
-            if criterion.judge(&look).violates() {
-                let error = look.error_of(criterion.field());
-                largest = (largest.0.max(error), f64::max(largest.1, criterion.rank(&look).excess));
-            }
-        }
-        largest
-    }
-
-    /// Checks the statistics of refinement.
-    fn check_answer(&self, told: &Told<'_>) -> Result<(), String> {
-        let request = &self.query.request;
-        let Outcome { error: reported, excess, satisfied, done, .. } = *self.outcome;
-        if !done {
-            return Err("stopped although nothing stood in the way".to_owned());
-        }
-        let (_, violation) =
-            self.largest(told, Request { needs: request.needs.clone(), ..Request::default() });
-        if satisfied != (violation <= 1.0) || satisfied && excess > 1.0 {
-            let answer = if satisfied { "satisfied" } else { "not satisfied" };
-            return Err(format!("reported as {answer}, with an excess of {violation}"));
-        }
-        if !satisfied && excess < violation {
-            return Err(format!("the excess is {violation}, not {excess} as reported"));
-        }
-        if !satisfied && request.budget.is_unlimited() {
-            return Err(format!("nothing stood in the way, but the excess is {violation}"));
-        }
-        let of_field = |need: &&Need| !matches!(need.part, Part::View(_) | Part::Transfer(_));
-        let exact = |need: &Need| Need { error: 0.0, ..need.clone() };
-        // Each need by itself: they may measure different fields.
-        let alone = |need: Need| self.largest(told, need.into()).0;
-        let needs = request.needs.iter().filter(of_field).map(exact);
-        let largest = needs.map(alone).fold(ErrorCode::ZERO, ErrorCode::max);
-        if largest > reported {
-            return Err(format!(
-                "the error bound is {}, not {} as reported",
-                largest.error(),
-                reported.error()
-            ));
-        }
-        Ok(())
-    }
 }

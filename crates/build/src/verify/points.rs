@@ -1,8 +1,9 @@
 //! The mesh that an MT makes of points, as if it had been the input.
 
+use super::fronts::{fresh, satisfy};
 use super::mesh_checks::PlainMesh;
+use super::queries::Query;
 use super::same::volume;
-use super::{Query, fresh, satisfy};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::ApplyUpdates;
 use tetralod::refine::Request;

@@ -4,8 +4,9 @@
 //! formulas for one tetrahedron at a time; so nothing is lost where coordinates or values are large beside the size of the model or the
 //! range of the field. What a session gives may differ by the rounding of double precision where it is: see [`Rounding`].
 
+use super::Reference;
 use super::history::Numbers;
-use super::{Reference, VerifyReport, note};
+use super::report::{VerifyReport, note};
 use glam::DVec3;
 use tetralod::geom::{Bounds, PointGrid};
 use tetralod::mesh::{FACES, TetMesh};

@@ -1,7 +1,7 @@
 //! How far is the boundary of an extracted mesh from that of the input, and that of the input from it?
 
-use super::deviation::{Failures, Measured};
 use super::parts::Ask;
+use super::report::{Failures, Measured};
 use foldhash::{HashMap, HashSet};
 use glam::DVec3;
 use tetralod::geom::{TriangleGrid, nearest_on_triangle};

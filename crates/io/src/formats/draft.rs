@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use crate::cells::{self, CellList, Numbering};
 use crate::error::ReadReason;
 use crate::fields::{Collector, check_finite, check_finite_cells};
-use crate::{CellData, ReadOptions, points_from};
+use crate::number::points_from;
+use crate::{CellData, ReadOptions};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
 /// Points, cells and fields as they were read.

@@ -10,7 +10,7 @@ use crate::ReadOptions;
 use crate::error::{At, ReadError, ReadReason};
 use crate::formats::draft::Draft;
 use crate::formats::exodus_cells::{Element, element};
-use crate::formats::hdf5::{checked_times, netcdf_reason};
+use crate::formats::hdf5_values::{checked_times, netcdf_reason};
 use tetralod::mesh::TetMesh;
 
 /// A file.

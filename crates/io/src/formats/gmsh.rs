@@ -10,7 +10,8 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{At, ReadError, ReadReason};
-use crate::formats::draft::Draft;
+use crate::formats::gmsh_layout::{Layout, Version};
+use crate::formats::gmsh_mesh::Mesh;
 use crate::formats::gmsh_sections::{read_elements, read_entities, read_nodes, read_partitions};
 use crate::formats::gmsh_views::{self, At as ViewAt, Head, SECTIONS, Steps, View};
 use crate::formats::scanner::Scanner;
@@ -20,24 +21,6 @@ use tetralod::mesh::TetMesh;
 
 /// How files begin, the last one those of version 1.
 const FIRST: [&str; 3] = ["$MeshFormat", "$Comments", "$NOD"];
-
-/// Which of the layouts a file has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Version {
-    Two,
-    Four,
-    FourOne,
-}
-
-/// How the numbers of a file are written.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
-    pub version: Version,
-    pub binary: bool,
-    pub big: bool,
-    /// Of version 4.1: the type of counts and tags.
-    pub wide: NumberType,
-}
 
 /// Reads a file.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
@@ -86,28 +69,6 @@ pub(super) fn is_first(bytes: &[u8]) -> bool {
     FIRST.iter().any(|first| start.starts_with(first.as_bytes()))
 }
 
-/// What was read so far.
-pub(super) struct Mesh<'a> {
-    layout: Option<Layout>,
-    pub draft: Draft<'a>,
-    /// The index of each node, by its tag.
-    pub nodes: HashMap<i64, usize>,
-    /// The tags of the cells that are kept.
-    pub cell_tags: Vec<i64>,
-    pub entities: Vec<f64>,
-    pub physical: Vec<f64>,
-    /// The physical group of each volume, by its tag, if it has one; none if no volume has one.
-    pub groups: HashMap<i64, Option<i64>>,
-    /// The geometric entity that a partition of a volume is of, and its physical group.
-    pub partitions: HashMap<i64, (i64, Option<i64>)>,
-    /// The tags of the nodes of each element with a volume, if views at nodes of elements need them.
-    pub element_nodes: Option<HashMap<i64, Vec<i64>>>,
-    heads: Vec<Head>,
-    views: Vec<View>,
-    /// Sections that are left out.
-    skipped: Vec<String>,
-}
-
 /// Sections that change neither places nor values.
 const HARMLESS: [&str; 7] = [
     "$PhysicalNames",
@@ -119,24 +80,7 @@ const HARMLESS: [&str; 7] = [
     "$InterpolationScheme",
 ];
 
-impl<'a> Mesh<'a> {
-    fn new(options: &'a ReadOptions) -> Self {
-        Self {
-            layout: None,
-            draft: Draft::new(options),
-            nodes: HashMap::new(),
-            cell_tags: Vec::new(),
-            entities: Vec::new(),
-            physical: Vec::new(),
-            groups: HashMap::new(),
-            partitions: HashMap::new(),
-            element_nodes: None,
-            heads: Vec::new(),
-            views: Vec::new(),
-            skipped: Vec::new(),
-        }
-    }
-
+impl Mesh<'_> {
     fn section(&mut self, file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
         let missing = || ReadReason::Missing("section $MeshFormat".into());
         match name {

@@ -1,8 +1,9 @@
 //! The nodes and elements of Gmsh's meshes, in the layouts of each version.
 
 use crate::error::ReadReason;
-use crate::formats::gmsh::{Layout, Mesh, Version};
 use crate::formats::gmsh_cells::{Element, element};
+use crate::formats::gmsh_layout::{Layout, Version};
+use crate::formats::gmsh_mesh::Mesh;
 use crate::formats::scanner::Scanner;
 use crate::number::NumberType;
 

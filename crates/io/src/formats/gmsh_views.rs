@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::error::ReadReason;
-use crate::formats::gmsh::Layout;
+use crate::formats::gmsh_layout::Layout;
 use crate::formats::scanner::Scanner;
 use crate::number::NumberType;
 use tetralod::geom::bits_of;

@@ -3,12 +3,12 @@
 //!
 //! References become the field `ref` at cells. What has no volume is left out.
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::in_order;
 use crate::formats::draft::Draft;
 use crate::formats::medit_cells::{Cells, KINDS, expect_known, ordering};
 use crate::formats::scanner::Scanner;
-use crate::{Beside, ReadOptions, in_file};
+use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
 /// The first word of every file.

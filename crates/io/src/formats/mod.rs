@@ -9,10 +9,14 @@ mod exodus;
 mod exodus_cells;
 mod gmsh;
 mod gmsh_cells;
+mod gmsh_layout;
+mod gmsh_mesh;
 mod gmsh_sections;
 mod gmsh_views;
 #[cfg(feature = "hdf5")]
 pub(super) mod hdf5;
+#[cfg(feature = "hdf5")]
+mod hdf5_values;
 mod medit;
 mod medit_binary;
 mod medit_cells;

@@ -5,13 +5,14 @@
 
 use std::path::Path;
 
+use crate::ReadOptions;
 use crate::beside::FilesOf;
-use crate::error::{At, ReadError, ReadReason};
+use crate::cell_types::TETRAHEDRON;
+use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::component_of;
 use crate::formats::draft::Draft;
 use crate::formats::medit_cells;
 use crate::formats::scanner::{Scanner, parsed};
-use crate::{ReadOptions, cells, in_file};
 use tetralod::mesh::TetMesh;
 
 /// Reads the two files of which `path` is one.
@@ -125,7 +126,7 @@ fn add_cells(draft: &mut Draft<'_>, cells: &[i64], points: usize) {
     for cell in cells.chunks_exact(points) {
         match &order {
             Some(order) => draft.add_cell(QUADRATIC, order.iter().map(|&p| cell[p])),
-            None => draft.add_cell(cells::TETRAHEDRON, cell[..4].iter().copied()),
+            None => draft.add_cell(TETRAHEDRON, cell[..4].iter().copied()),
         }
     }
 }

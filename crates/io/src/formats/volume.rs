@@ -4,9 +4,9 @@ use std::io::Read;
 
 use crate::error::{At, ReadError, ReadReason};
 use crate::fields::{Collector, component_name, in_order};
-use crate::image::{GridValues, Placement};
+use crate::grid::{GridValues, Placement, checked_dims};
 use crate::number::NumberType;
-use crate::{Beside, ReadOptions, structured};
+use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
 /// Most values of a sample.
@@ -82,7 +82,7 @@ impl Volume {
 
     /// How many bytes the samples have.
     pub fn bytes(&self) -> Result<usize, ReadReason> {
-        structured::checked_dims(self.dims)?;
+        checked_dims(self.dims)?;
         let components = usize::try_from(self.components()).unwrap_or(usize::MAX);
         let sizes = [components, self.number.size()].into_iter();
         let points = self.dims.iter().map(|d| *d as usize);

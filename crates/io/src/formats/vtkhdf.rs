@@ -8,17 +8,20 @@ use std::ops::Range;
 
 use hdf5_reader::{Dataset, Hdf5File};
 
+use crate::cell_types;
 use crate::cells::{self, CellList, Numbering};
 use crate::error::{At, ReadError, ReadReason};
 use crate::fields::{Collector, check_finite, check_finite_cells};
-use crate::formats::hdf5::{
+use crate::formats::hdf5_values::{
     all_integers, attribute_values, checked_times, floats, integers, number_kind, reason, row_length, rows,
 };
-use crate::image::{self, Extent, GridValues, Placement};
+use crate::ghosts::{GHOST_TYPE, HIDDEN_POINT};
+use crate::grid::{self, Extent, Ghosts, GridValues, Placement};
+use crate::grid_parts::cubes_of;
+use crate::number::points_from;
 use crate::pvtu::Whole;
-use crate::structured::Ghosts;
-use crate::vtu::{GHOST_TYPE, HIDDEN_POINT, NumberPoints, first_number};
-use crate::{CellData, ReadOptions, points_from};
+use crate::vtu::{NumberPoints, first_number};
+use crate::{CellData, ReadOptions};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
 /// The group that makes a file of this format.
@@ -246,7 +249,7 @@ impl Reader<'_> {
             listed
                 .as_ref()
                 .and_then(|listed| listed.types.get(cell))
-                .is_some_and(|kind| !cells::is_flat(*kind))
+                .is_some_and(|kind| !cell_types::is_flat(*kind))
         };
         check_finite_cells(&cell_fields, is_there).at(|| place("CellData"))?;
         let numbering = numbers(&positions).at(|| place("Points"))?;
@@ -371,7 +374,7 @@ impl Reader<'_> {
     fn image(&self) -> Result<TetMesh, ReadError> {
         let place = || ROOT.to_owned();
         let (placement, whole) = self.placement().at(place)?;
-        let inner = image::cubes_of(whole);
+        let inner = cubes_of(whole);
         let [fields, others] = self.samples("PointData", whole, &[])?;
         let [cubes, other_cubes] = self.samples("CellData", inner, &fields)?;
         if fields.is_empty() && cubes.iter().all(|field| field.values.is_empty()) {
@@ -395,17 +398,17 @@ impl Reader<'_> {
         let root = self.file.group(ROOT).map_err(reason)?;
         let direction = match root.attribute("Direction") {
             Ok(direction) => fixed(&attribute_values(&direction)?, "Direction")?,
-            Err(_) => image::ALONG_THE_AXES,
+            Err(_) => grid::ALONG_THE_AXES,
         };
-        image::placed(whole, origin, spacing, direction)
+        grid::placed(whole, origin, spacing, direction)
     }
 
     /// Checks that there is an array with a value for each point or cube: without, a few words claim any size.
     fn expect_values(&self, whole: Extent) -> Result<(), ReadError> {
         let expected = |extent: Extent| -> Result<u64, ReadReason> {
-            Ok(image::dims_in(extent, extent)?.iter().product())
+            Ok(grid::dims_in(extent, extent)?.iter().product())
         };
-        for (group, extent) in [("PointData", whole), ("CellData", image::cubes_of(whole))] {
+        for (group, extent) in [("PointData", whole), ("CellData", cubes_of(whole))] {
             let count = expected(extent).at(|| ROOT.to_owned())?;
             for name in self.members(group).at(|| format!("{ROOT}/{group}"))? {
                 let dataset =
@@ -452,7 +455,7 @@ impl Reader<'_> {
         dataset: &Dataset,
         components: usize,
     ) -> Result<Vec<f64>, ReadReason> {
-        let dims = image::dims_in(extent, extent)?;
+        let dims = grid::dims_in(extent, extent)?;
         let steps = self.step.map(|_| rows(dataset));
         let expected: Vec<u64> = steps.into_iter().chain(dims.into_iter().rev()).collect();
         let shape = dataset.shape();

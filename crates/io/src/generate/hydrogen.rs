@@ -1,6 +1,6 @@
 //! Orbitals of the hydrogen atom, in real form, as textbooks of quantum mechanics have them. Lengths are in Bohr radii.
 
-use crate::generate::GenerateError;
+use super::error::GenerateError;
 use std::f64::consts::{PI, SQRT_2};
 use tetralod::mesh::{Grid, GridArray, LayeredGrid};
 
@@ -21,7 +21,7 @@ impl Default for Orbital {
 
 impl Orbital {
     /// The largest principal quantum number.
-    pub const MAX_N: u32 = 20;
+    pub const MAX_N: u32 = super::error::MAX_N;
 
     /// The orbital of the principal, azimuthal and magnetic quantum numbers `n`, `l` and `m`.
     ///

@@ -4,67 +4,19 @@
 
 mod abc_flow;
 mod bucky;
+mod error;
 mod helix;
 mod hydrogen;
 mod marschner_lobb;
 mod sphere_flow;
 
+pub use error::{GenerateError, VOLUMES};
 pub use hydrogen::Orbital;
 
 use tetralod::mesh::{LayeredGrid, TetMesh};
-use thiserror::Error;
-
-/// The names of what can be generated, each with a sentence about it.
-pub const VOLUMES: [(&str, &str); 6] = [
-    ("bucky", "density of the carbon molecule C60: 60 blobs on a truncated icosahedron"),
-    ("marschner-lobb", "density of Marschner and Lobb's test signal: waves at the limit of a 40³ grid"),
-    ("hydrogen", "density and amplitude of an orbital of the hydrogen atom"),
-    ("abc-flow", "pressure and velocity of the vortices of Arnold, Beltrami and Childress, drifting in time"),
-    ("helix", "density and charge of a model of DNA; the grid is 7/3 times as high as wide"),
-    ("sphere-flow", "pressure and speed of a flow past a sphere: tetrahedra, graded, around a hole"),
-];
 
 /// Smallest and largest size of a grid.
 const GRID_SIZES: [u32; 2] = [2, 4096];
-
-/// Why nothing was generated.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum GenerateError {
-    /// No generator has this name.
-    #[error("nothing named \"{0}\" can be generated; choose one of: {names}", names = VOLUMES.map(|(name, _)| name).join(", "))]
-    UnknownName(String),
-    /// The size is too small or too large.
-    #[error("{name} cannot have size {size}; choose one from {} to {}", .limits[0], .limits[1])]
-    Size {
-        /// The generator.
-        name: &'static str,
-        /// What was asked for.
-        size: u32,
-        /// Smallest and largest size.
-        limits: [u32; 2],
-    },
-    /// A grid has too many points for a mesh.
-    #[error(
-        "{points} points are more than a mesh can number; write the grid (.vti), or choose a smaller size"
-    )]
-    Points {
-        /// Those of the grid.
-        points: u64,
-    },
-    /// No orbital has these quantum numbers.
-    #[error(
-        "there is no orbital {n},{l},{m}: n must be 1 to {}, l less than n, and m from -l to l",
-        Orbital::MAX_N
-    )]
-    Orbital {
-        /// The principal number.
-        n: u32,
-        /// The azimuthal number.
-        l: u32,
-        /// The magnetic number.
-        m: i32,
-    },
-}
 
 /// What can be chosen of a volume beside its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,79 +3,34 @@
 //! [`SceneState`] says what is shown, as plain data. [`Scene::update`] computes what is out of date, and hands the renderer what has
 //! changed; nothing is computed that is not shown.
 
+mod error;
 mod kept;
+mod legend;
 mod objects;
 mod pick;
 mod state;
 mod styles;
 
+pub use error::SceneError;
+pub use legend::Legend;
 pub use state::{
     ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourState, CompareState,
     IsosurfaceState, MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
 };
 
-use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer, SideTarget, TextureView};
+use crate::gpu::{BoxLines, Look, MOST_CLIPS, Renderer, SideTarget, TextureView};
 use glam::DVec3;
 use kept::Kept;
 use objects::{Objects, Shown};
+use styles::clips;
 use styles::{quantity, scale};
-use tetralod::Coded;
 use tetralod::geom::{Bounds, Camera, Ray, SinglePoints};
-use tetralod::session::{Session, SessionError};
-use tetralod::view::{ClipPlane, ColourScale, Probe, ScaleError};
-use thiserror::Error;
+use tetralod::session::Session;
+use tetralod::view::Probe;
 
 /// The outline of the domain, on a dark and on a light background.
 const OUTLINE: [[f32; 4]; 2] = [[0.85, 0.9, 1.0, 0.35], [0.25, 0.28, 0.33, 0.6]];
 const REGION: [f32; 4] = [0.36, 0.86, 1.0, 1.0];
-
-/// Why a scene cannot be shown.
-#[derive(Clone, Debug, Error)]
-#[non_exhaustive]
-pub enum SceneError {
-    /// The GPU cannot draw it.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// The session cannot give what it shows.
-    #[error(transparent)]
-    Session(#[from] SessionError),
-    /// The colours have no range.
-    #[error("option `colours`: {0}")]
-    Scale(#[from] ScaleError),
-    /// Something that the state names is not possible.
-    #[error("option `{what}`: {problem}")]
-    State {
-        /// Which part of the state.
-        what: String,
-        /// What is wrong, and what to do.
-        problem: String,
-    },
-}
-
-impl Coded for SceneError {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Gpu(error) => error.code(),
-            Self::Session(error) => error.code(),
-            Self::State { .. } | Self::Scale(_) => "bad-option",
-        }
-    }
-}
-
-impl SceneError {
-    fn state(what: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self::State { what: what.into(), problem: problem.into() }
-    }
-}
-
-/// What the colours of a picture mean.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Legend {
-    /// The name of the field or the quantity.
-    pub label: String,
-    /// The colours of its values.
-    pub scale: ColourScale,
-}
 
 /// What is shown of a session's mesh.
 #[derive(Debug)]
@@ -403,19 +358,6 @@ fn check_volume(state: &SceneState) -> Result<(), SceneError> {
         return Err(SceneError::state("volume", problem));
     }
     Ok(())
-}
-
-/// All clip planes: those of the state, then the faces of its box.
-fn clips(state: &SceneState) -> Vec<ClipPlane> {
-    let mut clips: Vec<ClipPlane> = state.clips.iter().map(PlaneState::clip).collect();
-    if let Some(bounds) = state.clip_box.as_ref().and_then(state::bounds) {
-        for axis in 0..3 {
-            let normal = |sign: f64| [0, 1, 2].map(|i| if i == axis { sign } else { 0.0 });
-            clips.push(ClipPlane { normal: normal(1.0), offset: bounds.max[axis] });
-            clips.push(ClipPlane { normal: normal(-1.0), offset: -bounds.min[axis] });
-        }
-    }
-    clips
 }
 
 fn look(state: &SceneState, bounds: &Bounds) -> Look {

@@ -1,8 +1,8 @@
 //! What is computed from the mesh for a scene: surfaces, sections, tubes, values of tetrahedra.
 
 use super::state::{ArrowState, ColourState, StreamlineState};
-use super::styles::{cell_style, isosurface_style, medium, other_clips, quantity, range, scale};
-use super::{Legend, SceneError, SceneState, SliceState, clips};
+use super::styles::{cell_style, clips, isosurface_style, medium, other_clips, quantity, range, scale};
+use super::{Legend, SceneError, SceneState, SliceState};
 use crate::gpu::{Colouring, EdgeLook, Lighting, Renderer, Style};
 use std::borrow::Cow;
 use tetralod::geom::{Bounds, SingleValues};

@@ -1,7 +1,9 @@
 //! What a scene's state says of colours, shapes and media, as the renderer takes it.
 
-use super::state::{CellKind, CellState, ColourState, IsosurfaceState};
-use super::{SceneError, VolumeState};
+use super::SceneError;
+use super::state::{
+    CellKind, CellState, ColourState, IsosurfaceState, PlaneState, SceneState, VolumeState, bounds,
+};
 use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Style};
 use tetralod::session::TetQuantity;
 use tetralod::view::{ClipPlane, ColourScale, Medium};
@@ -121,6 +123,19 @@ fn opacity_at(opacities: &[[f64; 2]], value: f64) -> f64 {
         (None, Some(end)) => end[1],
         (None, None) => 0.0,
     }
+}
+
+/// All clip planes: those of the state, then the faces of its box.
+pub(super) fn clips(state: &SceneState) -> Vec<ClipPlane> {
+    let mut clips: Vec<ClipPlane> = state.clips.iter().map(PlaneState::clip).collect();
+    if let Some(bounds) = state.clip_box.as_ref().and_then(bounds) {
+        for axis in 0..3 {
+            let normal = |sign: f64| [0, 1, 2].map(|i| if i == axis { sign } else { 0.0 });
+            clips.push(ClipPlane { normal: normal(1.0), offset: bounds.max[axis] });
+            clips.push(ClipPlane { normal: normal(-1.0), offset: -bounds.min[axis] });
+        }
+    }
+    clips
 }
 
 #[cfg(test)]

@@ -1,0 +1,46 @@
+//! What a file contains, as far as it says so.
+
+use crate::error::ReadReason;
+use crate::grid::{Placement, checked_dims, most_tets};
+use tetralod::mesh::{Field, Grid};
+
+/// What a file says that it contains. The data may be damaged even so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Survey {
+    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, or with the feature `formats`
+    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
+    pub format: &'static str,
+    /// Its points.
+    pub points: u64,
+    /// The tetrahedra, at most, that its cells are or are split into.
+    pub cells: u64,
+    /// The grid, if it is one.
+    pub grid: Option<Grid>,
+    /// The fields at points, without values.
+    pub fields: Vec<Field>,
+    /// The fields at cells, without values.
+    pub cell_fields: Vec<Field>,
+}
+
+impl Survey {
+    /// A grid that may be turned.
+    pub(super) fn of_placement(
+        format: &'static str,
+        placement: &Placement,
+        fields: [Vec<Field>; 2],
+    ) -> Result<Self, ReadReason> {
+        if let Some(grid) = placement.grid()? {
+            return Ok(Self::of_grid(format, grid, fields));
+        }
+        checked_dims(placement.dims)?;
+        let ([fields, cell_fields], points) = (fields, placement.dims.iter().product());
+        Ok(Self { format, points, cells: most_tets(placement.dims), grid: None, fields, cell_fields })
+    }
+
+    /// A grid; six tetrahedra a cube.
+    pub(super) fn of_grid(format: &'static str, grid: Grid, [fields, cell_fields]: [Vec<Field>; 2]) -> Self {
+        let product =
+            |less: u64| grid.dims.iter().map(|&d| u64::from(d).saturating_sub(less)).product::<u64>();
+        Self { format, points: product(0), cells: 6 * product(1), grid: Some(grid), fields, cell_fields }
+    }
+}

@@ -1,0 +1,36 @@
+//! What to read of a file, and how to get at those beside it.
+
+use crate::error::ReadReason;
+use crate::memory::{FileBytes, MemoryLimit};
+
+/// What to read of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Names of the fields to keep, a vector's name for all its components; all if none. Others are not decoded, and may be
+    /// anything: see [`MeshInput::other_fields`](tetralod::mesh::MeshInput::other_fields).
+    pub fields: Option<Vec<String>>,
+    /// Keep the first field beside those that are named, and none else if none are: the first at points, or at cells where points have
+    /// none.
+    pub first: bool,
+    /// What to do with fields at cells.
+    pub cells: CellData,
+    /// Which step to read of a file that has several (see [`Step::number`](crate::Step::number)): the first one is 0. Others have one.
+    pub step: usize,
+    /// The most memory that reading may take.
+    pub memory: MemoryLimit,
+}
+
+/// What to do with fields at cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CellData {
+    /// Leave them out.
+    #[default]
+    LeaveOut,
+    /// Keep their names alone, for messages that say how to read them.
+    Names,
+    /// Read them: see [`TetMesh::cells_to_points`](tetralod::mesh::TetMesh::cells_to_points).
+    Values,
+}
+
+/// Gets the bytes of another file, by its path from the folder of the one that is read.
+pub(super) type Beside<'a> = &'a dyn Fn(&str) -> Result<FileBytes<'static>, ReadReason>;

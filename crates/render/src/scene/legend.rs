@@ -1,0 +1,12 @@
+//! What the colours of a picture mean.
+
+use tetralod::view::ColourScale;
+
+/// What the colours of a picture mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Legend {
+    /// The name of the field or the quantity.
+    pub label: String,
+    /// The colours of its values.
+    pub scale: ColourScale,
+}

@@ -1,0 +1,43 @@
+//! Scalar fields at points or cells of a mesh.
+
+use serde::Serialize;
+
+/// A scalar field with one value per point (or per tetrahedron), and what is known of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Field {
+    /// The field's name in the file it came from. Only the time steps of one field share a name.
+    pub name: String,
+    /// One value per point, in the order of [`TetMesh::positions`](crate::mesh::TetMesh::positions); of fields at cells, one per tetrahedron.
+    pub values: Vec<f64>,
+    /// The unit of the values; empty if it is not known.
+    pub unit: String,
+    /// Set when the field is a part of a vector or tensor.
+    pub vector: Option<VectorPart>,
+    /// The time that the values are of.
+    pub time: Option<f64>,
+    /// Whether the values are integers by the type that the file gave them.
+    pub integer: bool,
+}
+
+impl Field {
+    /// A field of which no more is known.
+    pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
+        Self { name: name.into(), values, ..Self::default() }
+    }
+
+    /// Whether a user who asks for `name` means this field: it has this name, or it is a component (not the length) of
+    /// the vector of this name.
+    pub fn answers_to(&self, name: &str) -> bool {
+        self.name == name || self.vector.as_ref().is_some_and(|v| v.name == name && v.component.is_some())
+    }
+}
+
+/// Which part of a vector or tensor a scalar field is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct VectorPart {
+    /// The vector's name.
+    pub name: String,
+    /// The component, from 0; none for the vector's length, which follows from the components.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub component: Option<u8>,
+}
