@@ -1,7 +1,8 @@
 //! `tetralod convert`: an MT file to one of another kind.
 
+use super::build::options;
+use super::files;
 use super::output::{self, Verbosity};
-use super::{build, files};
 use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -19,11 +20,11 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// The kind of MT that it becomes: half-edge, edge, vertex or explicit.
-    #[arg(long, value_name = "KIND", value_parser = build::kind)]
+    #[arg(long, value_name = "KIND", value_parser = options::kind)]
     kind: MtKind,
     /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: as in the file; of
     /// another kind 2048, 256 for kind half-edge].
-    #[arg(long, value_name = "N", value_parser = build::block_bits)]
+    #[arg(long, value_name = "N", value_parser = options::block_bits)]
     block_updates: Option<u32>,
     #[command(flatten)]
     verbosity: Verbosity,

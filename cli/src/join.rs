@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         EncodeOptions { check_margins: true, exact, histograms: true, metadata: plan.metadata().clone() };
     let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let mut rows = vec![("file", output.display().to_string())];
-    rows.extend(build::rows_of(&summary));
+    rows.extend(build::report::rows_of(&summary));
     rows.push(("file size", output::bytes(file_bytes)));
     verbosity.print(&Report { counts: summary, file_bytes }, &rows)
 }

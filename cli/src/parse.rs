@@ -1,5 +1,6 @@
-//! Numbers on the command line: alone, in lists, with a percent sign or a unit.
+//! What stands on the command line: numbers, alone, in lists, with a percent sign or a unit, and names of a list.
 
+use anyhow::Context;
 use std::str::FromStr;
 use tetralod::geom::Bounds;
 use tetralod::view::Plane;
@@ -122,6 +123,13 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
     let number = parse_size(digits)? * f64::from(1_u32 << shift);
     // The largest number of bytes that a float still counts one by one.
     if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too large")) }
+}
+
+/// What has this name.
+pub fn named<T: Copy>(text: &str, all: &[(&str, T)]) -> anyhow::Result<T> {
+    let found = all.iter().find(|(name, _)| *name == text).map(|&(_, value)| value);
+    let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+    found.with_context(|| format!("it must be one of: {}", names.join(", ")))
 }
 
 #[cfg(test)]

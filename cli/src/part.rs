@@ -1,6 +1,7 @@
 //! `tetralod part`: a mesh to parts that are built each on its own.
 
-use super::build::{BuildOptions, Way};
+use super::build::options::BuildOptions;
+use super::build::way::Way;
 use super::files;
 use super::output::{self, Verbosity};
 use super::parts::{Folder, PLAN, PlanFile};

@@ -1,8 +1,9 @@
 //! Building in parts: a folder of files, and the steps from file to file.
 
-use super::build::{failed, progress_bar, with_progress};
 use super::files;
 use super::output::{self, Verbosity};
+use super::progress::{progress_bar, with_progress};
+use super::remedies::failed;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -13,13 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use tetralod::mesh::TetMesh;
-use tetralod_build::parts::{
-    self, MOST_PARTS, Node, Part, PartUpdates, PartsError, Piecewise, Plan, Scratch,
-};
-use tetralod_build::{
-    BuildConfig, BuildProgress, BuildResult, Construction, OnProgress, memory_needed_in_parts,
-    memory_needed_in_pieces,
-};
+use tetralod_build::parts::{self, Node, Part, PartUpdates, PartsError, Piecewise, Plan, Scratch};
+use tetralod_build::{BuildConfig, BuildProgress, BuildResult, OnProgress};
 use tetralod_io::Pieces;
 
 /// Parses `I/N`: a part and how many there are.
@@ -382,31 +378,4 @@ impl Parting<'_> {
             folder.assemble(&plan, verbosity).map(Ok)
         })
     }
-}
-
-/// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are
-/// threads; none if it is not.
-///
-/// If it comes in pieces, there are so many, and the largest one has so many tetrahedra.
-pub fn count_for(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>, most: u64) -> Option<u32> {
-    memory_in_parts(config, counts, pieces).into_iter().find(|&(_, needed)| needed <= most).map(|(n, _)| n)
-}
-
-/// The least memory in which it is built in parts; none if it is not.
-pub fn least_memory(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Option<u64> {
-    memory_in_parts(config, counts, pieces).into_iter().map(|(_, needed)| needed).min()
-}
-
-/// The memory that each number of parts takes; none if it is not built in parts.
-fn memory_in_parts(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Vec<(u32, u64)> {
-    let Construction::HalfEdge { .. } = config.construction else { return Vec::new() };
-    let parts = std::iter::successors(Some(2_u32), |count| Some(2 * count)).take_while(|&n| n <= MOST_PARTS);
-    let needed = |count: u32| {
-        let at_a_time = rayon::current_num_threads().min(count as usize);
-        match pieces {
-            None => memory_needed_in_parts(counts, count, at_a_time as u32),
-            Some(pieces) => memory_needed_in_pieces(counts, pieces, count, at_a_time as u32),
-        }
-    };
-    parts.map(|count| (count, needed(count))).collect()
 }

@@ -1,6 +1,6 @@
 //! Options of repair, and what was done and found, as programs get it.
 
-use super::build::named;
+use super::parse::named;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use tetralod::mesh::{MeshFindings, RepairLevel, RepairReport, TetMesh, findings};

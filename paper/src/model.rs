@@ -27,6 +27,7 @@ pub enum Recipe {
 }
 
 impl Recipe {
+    #[cfg(test)]
     pub const ALL: [Self; 5] = [Self::Edge, Self::Insert, Self::InsertOwn, Self::Delaunay, Self::HalfEdge];
 
     /// Kind of MT and how it is made, in a few words.

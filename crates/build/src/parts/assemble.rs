@@ -1,7 +1,7 @@
 //! One MT of the updates of all parts.
 
 use super::PartsError;
-use super::piece::{Made, Part, PartUpdates, Piece, UpdateRows};
+use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::decimate::append::{Appender, Ordered};
 use crate::decimate::collapses::report;
@@ -250,12 +250,12 @@ impl Assembly<'_> {
     }
 }
 
-/// What removes a tetrahedron: see [`UpdateRows::removers`].
-fn remover(code: u32, own: Span, earlier: &[u32]) -> u32 {
-    match code.checked_sub(1) {
-        None => NONE,
-        Some(code) if code % 2 == 0 => own.of(code / 2),
-        Some(code) => earlier[code as usize / 2],
+/// The number in the MT of what removes a tetrahedron; [`NONE`] if nothing does.
+fn remover(code: RemoverCode, own: Span, earlier: &[u32]) -> u32 {
+    match code.into() {
+        Remover::Nothing => NONE,
+        Remover::Own(update) => own.of(update),
+        Remover::Earlier(place) => earlier[place as usize],
     }
 }
 

@@ -1,7 +1,7 @@
 //! One step: the mesh of a part, or of several that are joined, is simplified as far as its place in the whole allows.
 
 use super::PartsError;
-use super::piece::{Head, Made, Part, PartUpdates, Piece, UpdateRows};
+use super::piece::{Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::change::work_mesh::{ELSEWHERE, WorkMesh};
 use crate::decimate::candidate_queue::Levels;
@@ -257,9 +257,9 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
     let known = piece.earlier.len() as u32;
     let mut rows = UpdateRows { earlier: piece.earlier.clone(), ..UpdateRows::default() };
     let remover = |maker: u32| match maker.checked_sub(known) {
-        _ if maker == NONE => 0,
-        None => 2 * maker + 2,
-        Some(own) => 2 * update_of[own as usize] + 1,
+        _ if maker == NONE => Remover::Nothing,
+        None => Remover::Earlier(maker),
+        Some(own) => Remover::Own(update_of[own as usize]),
     };
     for &c in &order {
         let Collapse { vertex, errors, star: (makers, inner) } = record.get(c);
@@ -267,7 +267,7 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
         rows.near.push(piece.points[record.near(c) as usize]);
         rows.errors.extend(errors.iter().map(|error| error.0));
         rows.stars.push(makers.len() as u8);
-        rows.removers.extend(makers.iter().copied().map(remover));
+        rows.removers.extend(makers.iter().map(|&maker| RemoverCode::from(remover(maker))));
         rows.inner.extend_from_slice(inner);
     }
     // What made the tetrahedra that are left, each once.

@@ -89,12 +89,47 @@ pub(super) struct UpdateRows {
     pub errors: Vec<u16>,
     /// How many tetrahedra each inserts.
     pub stars: Vec<u8>,
-    /// For each of these the update that removes it: 0 if none does, `2 u + 1` for update `u` of these rows, `2 i + 2` for the `i`-th
-    /// of `earlier`.
-    pub removers: Vec<u32>,
+    /// For each of these what removes it.
+    pub removers: Vec<RemoverCode>,
     /// Which of its faces go with it: see `Collapses::inner`.
     pub inner: Vec<u8>,
     pub earlier: Vec<Made>,
+}
+
+/// What removes a tetrahedron that an update inserts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Remover {
+    /// Nothing: it is one of the reference mesh.
+    Nothing,
+    /// An update of these rows, by its number.
+    Own(u32),
+    /// An update of an earlier step, by its place in [`UpdateRows::earlier`].
+    Earlier(u32),
+}
+
+/// A [`Remover`] as one number, as it is kept and written: 0 for nothing, `2 u + 1` for [`Remover::Own`], `2 i + 2` for
+/// [`Remover::Earlier`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct RemoverCode(pub u32);
+
+impl From<Remover> for RemoverCode {
+    fn from(remover: Remover) -> Self {
+        Self(match remover {
+            Remover::Nothing => 0,
+            Remover::Own(update) => 2 * update + 1,
+            Remover::Earlier(place) => 2 * place + 2,
+        })
+    }
+}
+
+impl From<RemoverCode> for Remover {
+    fn from(RemoverCode(code): RemoverCode) -> Self {
+        match code.checked_sub(1) {
+            None => Self::Nothing,
+            Some(code) if code % 2 == 0 => Self::Own(code / 2),
+            Some(code) => Self::Earlier(code / 2),
+        }
+    }
 }
 
 impl UpdateRows {
@@ -111,6 +146,18 @@ impl UpdateRows {
             earlier: self.earlier.clone(),
         };
         (self, rest)
+    }
+}
+
+impl Plan {
+    /// Reads the plan that a part belongs to, and no more of it.
+    ///
+    /// # Errors
+    /// If `input` fails, or holds no part.
+    pub fn read(input: &mut dyn Read) -> Result<Self, PartsError> {
+        read_magic(input)?;
+        let head: Head = read_frame(input)?;
+        Ok(head.plan)
     }
 }
 
@@ -258,10 +305,10 @@ impl PartUpdates {
         expect([rows.removers.len(), rows.inner.len()] == [inserted; 2], "its updates lack tetrahedra")?;
         let known = |&v: &u32| v < plan.counts[0];
         expect(rows.vertices.iter().chain(&rows.near).all(known), "its updates have other points")?;
-        let fits = |&remover: &u32| match remover.checked_sub(1) {
-            None => true,
-            Some(code) if code % 2 == 0 => ((code / 2) as usize) < count,
-            Some(code) => ((code / 2) as usize) < rows.earlier.len(),
+        let fits = |&code: &RemoverCode| match Remover::from(code) {
+            Remover::Nothing => true,
+            Remover::Own(update) => (update as usize) < count,
+            Remover::Earlier(place) => (place as usize) < rows.earlier.len(),
         };
         let all_fit = rows.removers.iter().all(fits) && rows.earlier.iter().all(|made| plan.has(made.node));
         expect(all_fit, "its updates refer to others")
@@ -336,8 +383,10 @@ mod tests {
             ("a near vertex that the whole lacks", &|r| r.near[0] = u32::MAX),
             ("an update without an error", &|r| r.errors.clear()),
             ("a tetrahedron too many", &|r| r.stars[0] += 1),
-            ("a remover that is no update", &|r| r.removers[0] = u32::MAX),
-            ("a remover that was none before", &|r| r.removers[0] = 2 * r.earlier.len() as u32 + 2),
+            ("a remover that is no update", &|r| r.removers[0] = RemoverCode(u32::MAX)),
+            ("a remover that was none before", &|r| {
+                r.removers[0] = Remover::Earlier(r.earlier.len() as u32).into()
+            }),
         ];
         for (what, change) in changes {
             let mut updates = updates.clone();

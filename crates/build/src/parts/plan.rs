@@ -1,12 +1,9 @@
 //! What all steps know of the whole.
 
 use super::PartsError;
-use super::piece::Head;
-use super::wire::{read_frame, read_magic};
 use crate::{BuildConfig, Purpose};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::ops::Range;
 use tetralod::geom::Lattice;
 use tetralod::mesh::VectorPart;
@@ -134,16 +131,6 @@ impl Plan {
             block_bits: config.block_bits.clamp(4, 16),
             metadata,
         }
-    }
-
-    /// Reads the plan that a part belongs to, and no more of it.
-    ///
-    /// # Errors
-    /// If `input` fails, or holds no part.
-    pub fn read(input: &mut dyn Read) -> Result<Self, PartsError> {
-        read_magic(input)?;
-        let head: Head = read_frame(input)?;
-        Ok(head.plan)
     }
 
     /// How many parts there are.

@@ -76,7 +76,6 @@ fn files_that_must_be_refused() {
         let error = refused(&folder, name).to_string();
         assert!(error.contains(reason), "{error}");
     }
-    #[cfg(feature = "formats")]
     assert!(refused(&folder, "native/liver.msh").to_string().contains("save it as version 2.2 or 4.1"));
 }
 

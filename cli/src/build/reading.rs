@@ -1,0 +1,138 @@
+//! The input of a build: a mesh, mended, or its pieces.
+
+use super::options::BuildOptions;
+use super::way::Way;
+use crate::output::{self, Verbosity};
+use crate::parts::InPieces;
+use crate::repair::Repair;
+use crate::{files, input};
+use anyhow::Result;
+use tetralod::mesh::{Field, GeometryField, RepairLevel, RepairReport, TetMesh};
+use tetralod_build::BuildConfig;
+use tetralod_build::parts::PartsError;
+use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
+
+impl BuildOptions {
+    /// Tells what was repaired, and what was found.
+    pub fn repair_of(
+        &self,
+        mesh: &TetMesh,
+        repaired: &RepairReport,
+        way: Way,
+        verbosity: &Verbosity,
+    ) -> Result<Option<Repair>> {
+        // To look through a grid takes more memory than its parts do, and nothing is wrong with it.
+        let is_sound = way != Way::Whole && mesh.grid.is_some();
+        let repair = if is_sound { None } else { Repair::of(mesh, self.repair.level(), repaired)? };
+        let repaired = repaired.to_string();
+        for line in [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)].into_iter().flatten() {
+            if !line.is_empty() && !verbosity.quiet {
+                output::note(&format!("{}: {line}", self.name()));
+            }
+        }
+        Ok(repair)
+    }
+
+    /// Reads what is wanted of the input, in so much memory at most.
+    ///
+    /// If it may be built in parts, a regular grid comes without points and tetrahedra where only its values are needed.
+    pub fn read(
+        &self,
+        config: &BuildConfig,
+        level: RepairLevel,
+        memory: Option<u64>,
+        in_parts: bool,
+    ) -> Result<(TetMesh, RepairReport)> {
+        let with_labels = !config.preserve.is_empty();
+        let cells = if self.cell_to_point || with_labels { CellData::Values } else { CellData::Names };
+        let wanted =
+            FieldSelection { names: &config.fields, all: config.all_fields, labels: &config.preserve, cells };
+        let needs_points = |name: &String| GeometryField::named(name).is_some();
+        let alone = in_parts
+            && cells == CellData::Names
+            && config.min_dihedral.is_none()
+            && !config.fields.iter().any(needs_points);
+        input::expect_format(&self.inputs, self.format.as_deref());
+        let source = input::Source { format: self.format.as_deref(), step: self.step, memory };
+        let (mut mesh, repaired) = input::read_cells(&self.inputs, &wanted, level, source, alone)?;
+        let is_label = |field: &&Field| config.preserve.contains(&field.name);
+        let labels: Vec<Field> = mesh.cell_fields.iter().filter(is_label).cloned().collect();
+        match self.cell_to_point {
+            true => mesh.cells_to_points(),
+            false => mesh.cell_fields.iter_mut().for_each(|field| field.values = Vec::new()),
+        }
+        mesh.cell_fields.extend(labels);
+        mesh.add_geometry_fields(&config.fields);
+        if config.construction.method().keeps_the_mesh() {
+            input::expect_cells(&mesh, &self.inputs[0])?;
+        }
+        self.set_units(&mut mesh)?;
+        Ok((mesh, repaired))
+    }
+
+    fn set_units(&self, mesh: &mut TetMesh) -> Result<()> {
+        for (name, unit) in &self.units {
+            let is_meant = |field: &&mut Field| {
+                field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+            };
+            let mut found = 0;
+            mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
+                field.unit.clone_from(unit);
+                found += 1;
+            });
+            let is_other = |field: &Field| {
+                field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+            };
+            if found == 0 && !mesh.input.other_fields.iter().any(is_other) {
+                anyhow::bail!("--unit {name}={unit}: there is no field '{name}'");
+            }
+        }
+        Ok(())
+    }
+
+    /// The pieces of the input, if it is a list of such that can be read one by one; `prepare` does what the options say to each.
+    pub fn in_pieces<T>(
+        &self,
+        config: &BuildConfig,
+        memory: Option<u64>,
+        work: impl FnOnce(InPieces<'_>) -> Result<Option<T>>,
+    ) -> Result<Option<T>> {
+        let needs_points = |name: &String| GeometryField::named(name).is_some();
+        let needs_whole = self.cell_to_point
+            || matches!(self.repair.level(), RepairLevel::Weld { .. })
+            || config.fields.iter().any(needs_points);
+        let [path] = &self.inputs[..] else { return Ok(None) };
+        if needs_whole || files::ending(path) != "pvtu" {
+            return Ok(None);
+        }
+        let steps = tetralod_io::steps(path)?;
+        let [step] = &steps[..] else { return Ok(None) };
+        if self.step.is_some_and(|step| step != 0) {
+            return Ok(None);
+        }
+        let wanted = FieldSelection {
+            names: &config.fields,
+            all: config.all_fields,
+            labels: &config.preserve,
+            cells: CellData::Names,
+        };
+        let memory = input::Source { memory, ..input::Source::default() }.limit();
+        let options = ReadOptions { step: step.number, memory, ..wanted.options() };
+        let Some(pieces) = Pieces::open(&step.path, &options)? else { return Ok(None) };
+        let prepare = |mesh: &mut TetMesh| {
+            files::note_inputs(&mesh.input.files.0);
+            if step.time.is_some() {
+                mesh.fields.iter_mut().for_each(|field| field.time = step.time);
+            }
+            self.set_units(mesh)
+        };
+        work(InPieces { pieces, prepare: &prepare })
+    }
+
+    /// Tells why pieces are read as a whole after all.
+    pub fn tell(&self, why: &PartsError, verbosity: &Verbosity) {
+        if !verbosity.quiet {
+            output::note(&format!("{}: {why}; so it is", self.name()));
+        }
+    }
+}

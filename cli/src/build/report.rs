@@ -1,0 +1,99 @@
+//! What `tetralod build` says of the file that it has written.
+
+use crate::output;
+use crate::repair::Repair;
+use crate::restrictions::Angles;
+use serde::Serialize;
+use std::path::Path;
+use tetralod_build::{BuildConfig, BuildCriterion, BuildSummary};
+
+/// The summary as programs get it.
+#[derive(Default, Serialize)]
+pub(super) struct Report {
+    pub kind: &'static str,
+    pub method: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub criterion: Option<&'static str>,
+    #[serde(flatten)]
+    pub counts: BuildSummary,
+    /// How far interfaces between regions have moved, in model units, if they may.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interface_deviation: Option<f64>,
+    pub file_bytes: u64,
+    pub bytes_per_vertex: f64,
+    pub seconds: f64,
+    /// What was done in words; the same and more is in `repair`.
+    pub repaired: String,
+    /// Of points without cells nothing is repaired.
+    pub repair: Option<Repair>,
+    /// With a bound for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angles: Option<Angles>,
+    /// What the reader left out of the input or changed, in words.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+}
+
+/// A report of nothing but what was repaired.
+pub(super) fn repaired_as(repaired: String) -> Report {
+    Report { repaired, ..Report::default() }
+}
+
+pub(super) fn report(
+    config: &BuildConfig,
+    summary: &BuildSummary,
+    file_bytes: u64,
+    seconds: f64,
+    repaired: String,
+) -> Report {
+    Report {
+        kind: config.construction.kind().name(),
+        method: config.construction.method().name(),
+        criterion: config.construction.criterion().map(BuildCriterion::name),
+        counts: *summary,
+        interface_deviation: (config.preserve_within > 0.0).then_some(summary.interface_deviation),
+        file_bytes,
+        bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
+        seconds,
+        repaired,
+        repair: None,
+        angles: None,
+        notes: Vec::new(),
+    }
+}
+
+/// The counts of a build for people.
+pub fn rows_of(counts: &BuildSummary) -> [(&'static str, String); 3] {
+    let &BuildSummary { vertices, tetrahedra, base_vertices, base_tetrahedra, updates, depth, .. } = counts;
+    [
+        ("reference mesh", output::mesh(vertices, tetrahedra)),
+        ("base mesh", output::mesh(base_vertices, base_tetrahedra)),
+        ("updates", format!("{}, at most {} deep", output::count(updates), output::count(depth))),
+    ]
+}
+
+pub(super) fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
+    let counts = &report.counts;
+    let removed = f64::from(counts.tetrahedra.saturating_sub(counts.base_tetrahedra));
+    let mut rows = vec![("file", output.display().to_string())];
+    rows.extend(rows_of(counts));
+    rows.extend([
+        ("position bits", counts.position_bits.to_string()),
+        ("file size", output::bytes(report.file_bytes)),
+        ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
+        (
+            "time",
+            format!(
+                "{:.2} s ({:.0} tetrahedra removed per second)",
+                report.seconds,
+                removed / report.seconds
+            ),
+        ),
+    ]);
+    let moved = report
+        .interface_deviation
+        .map(|moved| ("interfaces moved", format!("{} at most", output::number(moved))));
+    rows.extend(moved);
+    rows.extend(report.angles.iter().flat_map(Angles::rows));
+    rows
+}

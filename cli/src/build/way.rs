@@ -1,0 +1,118 @@
+//! Whether a mesh is built as a whole or in parts, so that it fits the memory.
+
+use super::options::BuildOptions;
+use crate::machine;
+use crate::output::{self, Verbosity, bytes, count};
+use anyhow::{Context, Result, anyhow};
+use tetralod::mesh::{Field, TetMesh};
+use tetralod_build::parts::MOST_PARTS;
+use tetralod_build::{
+    BuildConfig, Construction, memory_needed, memory_needed_in_parts, memory_needed_in_pieces,
+};
+
+/// How a mesh is built.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    Whole,
+    /// In so many parts.
+    Parts(u32),
+}
+
+/// How many fields of a mesh are kept.
+pub(super) fn kept_fields(config: &BuildConfig, mesh: &TetMesh) -> u64 {
+    let is_kept = |field: &&Field| config.fields.iter().any(|name| field.answers_to(name));
+    let fields = match config.all_fields {
+        true => mesh.fields.len(),
+        false => mesh.fields.iter().filter(is_kept).count(),
+    };
+    fields.max(1) as u64
+}
+
+/// From so much memory on, the command says what it needs.
+const MUCH_MEMORY: u64 = 1 << 30;
+
+/// What was asked for on the command line.
+pub(super) struct Asked<'a> {
+    pub options: &'a BuildOptions,
+    pub parts: Option<u32>,
+    pub memory: Option<u64>,
+    pub verbosity: &'a Verbosity,
+}
+
+/// Says how much memory building takes where that is much, and chooses how to keep to what is allowed.
+///
+/// Of a mesh of so many points, tetrahedra and fields; if it comes in pieces, there are so many, and the largest one has so many
+/// tetrahedra.
+pub(super) fn way(
+    asked: &Asked<'_>,
+    config: &BuildConfig,
+    [points, tetrahedra, fields]: [u64; 3],
+    pieces: Option<[u64; 2]>,
+) -> Result<Way> {
+    let &Asked { options, parts, memory, verbosity } = asked;
+    let needed = memory_needed(config.construction, points, tetrahedra, fields);
+    let what = format!("building {} tetrahedra takes about {}", count(tetrahedra), bytes(needed));
+    let tell = |line: String| {
+        if !verbosity.quiet {
+            output::note(&format!("{}: {line}", options.name()));
+        }
+    };
+    if let Some(parts) = parts {
+        return Ok(if parts == 1 { Way::Whole } else { Way::Parts(parts) });
+    }
+    match memory {
+        Some(most) if needed > most => {
+            if let Some(parts) = count_for(config, [points, tetrahedra, fields], pieces, most) {
+                tell(format!("{what} of memory at once, so it is built in {parts} parts"));
+                return Ok(Way::Parts(parts));
+            }
+            let in_parts = match least_memory(config, [points, tetrahedra, fields], pieces) {
+                Some(least) => format!("in parts about {}, ", bytes(least)),
+                None => "and only kind half-edge is built in parts, ".to_owned(),
+            };
+            Err(anyhow!(
+                "{what} of memory, {in_parts}more than --memory allows ({}): allow more, keep fewer fields, or build a coarser mesh",
+                bytes(most)
+            ))
+            .with_context(|| options.name())
+        }
+        None if let Some(most) = machine::memory().filter(|most| needed > *most) => Err(anyhow!(
+            "{what} of memory at most, more than there is ({}): with --memory it is built in parts, or tried all the same",
+            bytes(most)
+        ))
+        .with_context(|| options.name()),
+        _ => {
+            if needed >= MUCH_MEMORY {
+                tell(format!("{what} of memory at most"));
+            }
+            Ok(Way::Whole)
+        }
+    }
+}
+
+/// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are
+/// threads; none if it is not.
+///
+/// If it comes in pieces, there are so many, and the largest one has so many tetrahedra.
+fn count_for(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>, most: u64) -> Option<u32> {
+    memory_in_parts(config, counts, pieces).into_iter().find(|&(_, needed)| needed <= most).map(|(n, _)| n)
+}
+
+/// The least memory in which it is built in parts; none if it is not.
+fn least_memory(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Option<u64> {
+    memory_in_parts(config, counts, pieces).into_iter().map(|(_, needed)| needed).min()
+}
+
+/// The memory that each number of parts takes; none if it is not built in parts.
+fn memory_in_parts(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Vec<(u32, u64)> {
+    let Construction::HalfEdge { .. } = config.construction else { return Vec::new() };
+    let parts = std::iter::successors(Some(2_u32), |count| Some(2 * count)).take_while(|&n| n <= MOST_PARTS);
+    let needed = |count: u32| {
+        let at_a_time = rayon::current_num_threads().min(count as usize);
+        match pieces {
+            None => memory_needed_in_parts(counts, count, at_a_time as u32),
+            Some(pieces) => memory_needed_in_pieces(counts, pieces, count, at_a_time as u32),
+        }
+    };
+    parts.map(|count| (count, needed(count))).collect()
+}
