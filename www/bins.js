@@ -26,7 +26,7 @@ export function place([at, height]) {
 export function rebinned(volumes, [low, high], [least, most]) {
   const count = volumes.length;
   const made = new Float64Array(count);
-  const bin = (value) => (most > least ? ((value - least) / (most - least)) * count : 0);
+  const bin = (/** @type {number} */ value) => (most > least ? ((value - least) / (most - least)) * count : 0);
   Array.from(volumes).forEach((volume, i) => {
     const [start, end] = [i, i + 1].map((edge) => bin(low + (edge / count) * (high - low)));
     const first = Math.min(Math.floor(start), count - 1);
@@ -72,7 +72,7 @@ export function histogramPath(volumes) {
   const most = Math.max(0, ...all);
   if (!(most > 0)) return "";
   const isLog = isLogarithmic(all);
-  const height = (part) => (isLog ? Math.max(1 - Math.log(part) / Math.log(LEAST), LOWEST) : Math.sqrt(part));
+  const height = (/** @type {number} */ part) => (isLog ? Math.max(1 - Math.log(part) / Math.log(LEAST), LOWEST) : Math.sqrt(part));
   const steps = all.map((volume, i) => {
     const high = volume > 0 ? height(volume / most) : 0;
     return [place([i / all.length, high]), place([(i + 1) / all.length, high])].map((p) => p.join(" ")).join("L");

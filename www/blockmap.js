@@ -3,10 +3,10 @@
  * lies over all others. Coarse blocks, as large as the volume, hardly show: they are always needed.
  */
 
-import { $ } from "./dom.js";
+import { $, all } from "./dom.js";
 import { count } from "./format.js";
 import { fail } from "./messages.js";
-import { demo, page } from "./page.js";
+import { page, viewer, volume } from "./page.js";
 import { shownTab } from "./tabs.js";
 
 /** How blocks look: not fetched, fetched, in use; in this order they are drawn. */
@@ -36,7 +36,7 @@ let map;
 let asking = false;
 let isOld = false;
 
-/** @returns {undefined} */
+/** @param {any} error @returns {undefined} */
 function failed(error) {
   if (error.code !== "freed") fail(error);
 }
@@ -48,7 +48,7 @@ export async function showBlockMap() {
   asking = true;
   while (isOld) {
     isOld = false;
-    map = await page.viewer.blockMap().catch(failed);
+    map = await viewer().blockMap().catch(failed);
     showCounts();
     draw();
     await new Promise((resolve) => setTimeout(resolve, PAUSE));
@@ -60,19 +60,27 @@ function showCounts() {
   $("blocks-map").hidden = !map;
   if (!map) return;
   for (const [state, { name }] of LOOKS.entries()) {
-    const words = $("blocks-counts").querySelector(`.${name} b`);
-    words.textContent = count(map.states.reduce((sum, one) => sum + Number(one === state), 0));
+    all(`#blocks-counts .${name} b`)[0].textContent = count(map.states.reduce((sum, one) => sum + Number(one === state), 0));
   }
 }
 
-/** Coordinates on the map of a point of the model: right, down, and towards the eye. */
-function projection({ width, height }) {
-  const { bounds } = demo.info;
-  const [right, up, towards] = page.overlay.rotation;
+/** @typedef {ArrayLike<number>} Numbers */
+/** @typedef {{ place: (point: Numbers) => [number, number], depth: (point: Numbers) => number, isSeen: (face: (typeof FACES)[number]) => boolean }} View */
+
+/**
+ * Coordinates on the map of a point of the model: right, down, and towards the eye.
+ *
+ * @param {number[][]} rotation
+ * @param {{ width: number, height: number }} size
+ * @returns {View}
+ */
+function projection([right, up, towards], { width, height }) {
+  const { bounds } = volume();
   const middle = [0, 1, 2].map((i) => (bounds[i] + bounds[i + 3]) / 2);
   // How far the corners of the volume are from its middle, to the right and upwards.
-  const reach = (direction) => direction.reduce((sum, x, i) => sum + Math.abs(x) * (bounds[i + 3] - bounds[i]), 0) / 2;
+  const reach = (/** @type {number[]} */ direction) => direction.reduce((sum, x, i) => sum + Math.abs(x) * (bounds[i + 3] - bounds[i]), 0) / 2;
   const scale = Math.min((width / 2 - MARGIN) / reach(right), (height / 2 - MARGIN) / reach(up));
+  /** @param {number[]} direction @param {Numbers} point */
   const along = (direction, point) => direction.reduce((sum, x, i) => sum + x * (point[i] - middle[i]), 0);
   return {
     place: (point) => [width / 2 + scale * along(right, point), height / 2 - scale * along(up, point)],
@@ -81,11 +89,11 @@ function projection({ width, height }) {
   };
 }
 
-const lengths = (box) => [0, 1, 2].map((axis) => box[axis + 3] - box[axis]);
+const lengths = (/** @type {Numbers} */ box) => [0, 1, 2].map((axis) => box[axis + 3] - box[axis]);
 
-/** The order in which boxes are drawn: by state, then from the back to the front. `part` is how long they are, of the volume. */
+/** The order in which boxes are drawn: by state, then from the back to the front. `part` is how long they are, of the volume. @param {BlockMap} map @param {View} view */
 function order({ bounds, states }, { depth }) {
-  const whole = lengths(demo.info.bounds);
+  const whole = lengths(volume().bounds);
   const all = Array.from(states, (state, i) => {
     const box = bounds.subarray(6 * i, 6 * i + 6);
     const part = Math.cbrt(lengths(box).reduce((product, length, axis) => product * Math.min(length / whole[axis], 1), 1));
@@ -95,22 +103,22 @@ function order({ bounds, states }, { depth }) {
 }
 
 function draw() {
-  const canvas = $("blocks-canvas");
-  if (!map || !page.overlay.rotation || shownTab() !== "data") return;
+  const canvas = $("blocks-canvas", HTMLCanvasElement);
+  const [context, rotation] = [canvas.getContext("2d"), page.overlay.rotation];
+  if (!context || !map || !rotation || shownTab() !== "data") return;
   const [width, height, ratio] = [canvas.clientWidth, canvas.clientHeight, devicePixelRatio];
   if (width === 0) return;
   Object.assign(canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
-  const context = canvas.getContext("2d");
   context.scale(ratio, ratio);
   context.lineJoin = "round";
   context.lineWidth = 1;
-  const view = projection({ width, height });
+  const view = projection(rotation, { width, height });
   const seen = FACES.filter(view.isSeen);
   // The colours of the words below the map.
-  const colours = LOOKS.map(({ name }) => getComputedStyle($("blocks-counts").querySelector(`.${name}`), "::before").backgroundColor);
+  const colours = LOOKS.map(({ name }) => getComputedStyle(all(`#blocks-counts .${name}`)[0], "::before").backgroundColor);
   context.strokeStyle = getComputedStyle(canvas).color;
   context.globalAlpha = 0.35;
-  outline(context, demo.info.bounds, view, FACES);
+  outline(context, volume().bounds, view, FACES);
   context.stroke();
   const least = Math.min(FEW / map.states.length, 1);
   for (const { box, state, part } of order(map, view)) {
@@ -125,7 +133,7 @@ function draw() {
   }
 }
 
-/** The path of these faces of a box. @param {ArrayLike<number>} box */
+/** The path of these faces of a box. @param {CanvasRenderingContext2D} context @param {Numbers} box @param {View} view @param {typeof FACES} faces */
 function outline(context, box, { place }, faces) {
   const corners = Array.from({ length: 8 }, (_, i) => place([0, 1, 2].map((axis) => box[axis + (i & (1 << axis) ? 3 : 0)])));
   context.beginPath();

@@ -7,7 +7,7 @@ import { RepairControls, repairWords } from "./repair.js";
 /** Names of files that an MT can be built of. */
 const MESH = /\.(vtu|vti|vts|vtr|vtk|raw|json)$/i;
 
-/** What the phases of the work are called. */
+/** What the phases of the work are called. @type {Record<string, string>} */
 const PHASES = {
   read: "Reading the file",
   parse: "Decoding",
@@ -56,6 +56,7 @@ class BuildDialog {
   #cancel = element("button", { type: "button", textContent: "Cancel" });
   #dialog = element("dialog", { className: "build" });
 
+  /** @param {File[]} files @param {(file: File) => unknown} open */
   constructor(files, open) {
     this.#files = files;
     this.#open = open;
@@ -111,6 +112,7 @@ class BuildDialog {
     }
   }
 
+  /** @param {import("tetralod/build").InputInfo["fields"]} fields */
   #showFields(fields) {
     const boxes = fields.map(({ name, at, unit }, i) => {
       const box = element("input", { type: "checkbox", value: name, checked: i === 0 });
@@ -138,6 +140,7 @@ class BuildDialog {
     }
   }
 
+  /** @param {import("tetralod/build").InputInfo["memory"]} memory */
   #showMemory({ needed, available, fits }) {
     const much = `about ${size(needed)} of memory`;
     this.#memory.textContent = fits
@@ -155,11 +158,11 @@ class BuildDialog {
     this.#cancel.textContent = "Cancel";
     try {
       const { build } = await import("tetralod/build");
-      const onProgress = (progress) => this.#showProgress(progress);
+      const onProgress = (/** @type {import("tetralod/build").BuildProgress} */ progress) => this.#showProgress(progress);
       const { bytes, report } = await build(this.#files, { ...options, onProgress });
       this.#setBusy(false);
       this.#finish(new File([bytes], `${this.#name.replace(MESH, "")}.mt`), report);
-    } catch (error) {
+    } catch (/** @type {any} */ error) {
       this.#setBusy(false);
       this.#status.textContent = "";
       this.#fail(error);
@@ -168,18 +171,20 @@ class BuildDialog {
     }
   }
 
-  /** Nothing can be chosen while the build runs. */
+  /** Nothing can be chosen while the build runs. @param {boolean} isBusy */
   #setBusy(isBusy) {
     for (const control of [this.#start, this.#fields, this.#repair.fieldset]) control.disabled = isBusy;
     this.#bar.hidden = !isBusy;
   }
 
+  /** @param {import("tetralod/build").BuildProgress} progress */
   #showProgress({ phase, fraction, tetrahedra }) {
     this.#bar.value = fraction;
     const left = tetrahedra === undefined ? "" : `, ${count(tetrahedra)} tetrahedra`;
     this.#status.textContent = `${PHASES[phase]}${left}`;
   }
 
+  /** @param {File} file @param {import("tetralod/build").BuildReport} report */
   #finish(file, report) {
     const { tetrahedra, seconds } = report;
     this.#status.textContent = `${count(tetrahedra)} tetrahedra in ${size(file.size)}, built in ${seconds.toFixed(1)} s`;
@@ -197,7 +202,7 @@ class BuildDialog {
     this.#open(file);
   }
 
-  #fail(error) {
+  #fail(/** @type {any} */ error) {
     if (error?.name === "AbortError") return;
     this.#error.textContent = error.message;
     this.#error.hidden = false;

@@ -1,53 +1,50 @@
 /** The settings that compare meshes: a mesh that stays, one that is kept, and both beside each other. */
 
-/** @type {(id: string) => any} Each caller knows the type of its element. */
-const $ = (id) => document.getElementById(id);
+import { $, button, input } from "./dom.js";
+import { fail } from "./messages.js";
+import { demo, viewer } from "./page.js";
+import { store } from "./state.js";
 
-export class Comparison {
-  #viewer;
-  #isKept = false;
+/** What the viewer is to show of it. */
+export function comparison() {
+  const { kept, split, difference } = store.state;
+  // The difference is shown on all of the picture: one legend cannot tell the colours of both halves.
+  return kept ? { at: difference ? 0 : split / 100, difference } : null;
+}
 
-  /**
-   * @param {import("tetralod/viewer").Viewer} viewer
-   * @param {{ onChange: () => void, onError: (error: any) => void }} page `onChange` draws again
-   */
-  constructor(viewer, { onChange, onError }) {
-    this.#viewer = viewer;
-    const changed = () => {
-      this.#show();
-      onChange();
+function showComparison() {
+  const { kept, split, difference } = store.state;
+  button("keep").textContent = kept ? "Forget the kept mesh" : "Keep this mesh";
+  $("comparison").hidden = !kept;
+  input("split").disabled = difference;
+  $("divider").hidden = !kept || difference;
+  $("divider").style.left = `${split}%`;
+}
+
+export function attachComparison() {
+  input("freeze").addEventListener("input", () => store.change({ freeze: input("freeze").checked }));
+  input("split").addEventListener("input", () => store.change({ split: input("split").valueAsNumber }));
+  input("difference").addEventListener("input", () => store.change({ difference: input("difference").checked }));
+  let isKeeping = false;
+  button("keep").addEventListener("click", () => {
+    // Pressed again it forgets the mesh, also while that is on its way.
+    isKeeping = !isKeeping && !store.state.kept;
+    if (!isKeeping) return store.change({ kept: false });
+    const { info } = demo;
+    const done = () => {
+      if (isKeeping && info === demo.info) store.change({ kept: true });
+      isKeeping = false;
     };
-    $("freeze").addEventListener("input", () => viewer.freeze($("freeze").checked).catch(onError));
-    $("keep").addEventListener("click", () => {
-      // Both at once: pressed again it forgets the mesh.
-      const kept = this.#isKept ? Promise.resolve() : viewer.keep();
-      this.#isKept = !this.#isKept;
-      kept.then(changed, onError);
-    });
-    $("split").addEventListener("input", changed);
-    $("difference").addEventListener("input", changed);
-  }
-
-  /** Another volume was opened: it has no mesh that was kept. */
-  forget() {
-    this.#isKept = false;
-    if ($("freeze").checked) this.#viewer.freeze(false).catch(() => {});
-    $("freeze").checked = false;
-    this.#show();
-  }
-
-  /** What the viewer is to show of it. */
-  get state() {
-    // The difference is shown on all of the picture: one legend cannot tell the colours of both halves.
-    const difference = $("difference").checked;
-    return this.#isKept ? { at: difference ? 0 : Number($("split").value) / 100, difference } : null;
-  }
-
-  #show() {
-    $("keep").textContent = this.#isKept ? "Forget the kept mesh" : "Keep this mesh";
-    $("comparison").hidden = !this.#isKept;
-    $("split").disabled = $("difference").checked;
-    $("divider").hidden = !this.#isKept || $("difference").checked;
-    $("divider").style.left = `${$("split").value}%`;
-  }
+    viewer().keep().then(done, fail);
+  });
+  let isFrozen = false;
+  store.subscribe(["freeze"], () => {
+    const { freeze } = store.state;
+    input("freeze").checked = freeze;
+    if (freeze === isFrozen) return;
+    isFrozen = freeze;
+    // While another volume is opened, it does not matter.
+    viewer().freeze(freeze).catch((error) => demo.info && fail(error));
+  });
+  store.subscribe(["kept", "split", "difference"], showComparison);
 }

@@ -1,6 +1,6 @@
 /** A screenshot with what lies over the picture: axes, scale bar, colour bar. */
 
-import { $ } from "./dom.js";
+import { $, all, svg } from "./dom.js";
 
 /** What of the style of an SVG shape is copied, since the style sheet of the page is not in the picture. */
 const STYLES = ["fill", "stroke", "stroke-width", "stroke-linejoin", "stroke-dasharray", "paint-order", "text-anchor", "font-size", "font-weight", "font-family"];
@@ -16,6 +16,7 @@ const BAR = 12;
 export async function compose(picture, { width, height, canvas }) {
   const made = new OffscreenCanvas(width, height);
   const context = made.getContext("2d");
+  if (!context) return picture;
   context.drawImage(await createImageBitmap(picture), 0, 0);
   context.drawImage(await overlay(width, height), 0, 0, width, height);
   const scale = width / canvas.clientWidth;
@@ -24,9 +25,9 @@ export async function compose(picture, { width, height, canvas }) {
   return made.convertToBlob({ type: "image/png" });
 }
 
-/** The overlay of the page as an image of this size. */
+/** The overlay of the page as an image of this size. @param {number} width @param {number} height */
 async function overlay(width, height) {
-  const shown = $("overlay");
+  const shown = svg("overlay");
   const copy = /** @type {SVGSVGElement} */ (shown.cloneNode(true));
   const [from, to] = [shown, copy].map((svg) => [...svg.querySelectorAll("*")]);
   for (const [i, element] of from.entries()) {
@@ -48,7 +49,7 @@ async function overlay(width, height) {
 function legend(context, stage) {
   const box = $("legend");
   if (box.hidden) return;
-  const place = (element) => {
+  const place = (/** @type {HTMLElement} */ element) => {
     const { left, top, width, height } = element.getBoundingClientRect();
     return { x: left - stage.left, y: top - stage.top, width, height };
   };
@@ -59,18 +60,19 @@ function legend(context, stage) {
   context.roundRect(whole.x, whole.y, whole.width, whole.height, 9);
   context.fill();
   const bar = place($("legend-bar"));
-  const colours = $("legend-bar").dataset.colours.split(" ");
+  const colours = ($("legend-bar").dataset.colours ?? "").split(" ");
   const gradient = context.createLinearGradient(bar.x, 0, bar.x + bar.width, 0);
   colours.forEach((colour, i) => gradient.addColorStop(i / (colours.length - 1), colour));
   context.fillStyle = gradient;
   context.fillRect(bar.x, bar.y, bar.width, BAR);
   context.fillStyle = style.color;
   context.textBaseline = "middle";
+  /** @param {HTMLElement} element @param {number} weight */
   const words = (element, weight) => {
     const { x, y, height } = place(element);
     context.font = `${weight} ${style.fontSize} ${style.fontFamily}`;
-    context.fillText(element.textContent, x, y + height / 2);
+    context.fillText(element.textContent ?? "", x, y + height / 2);
   };
   words($("legend-name"), 600);
-  for (const tick of $("legend-ticks").children) if (!(/** @type {HTMLElement} */ (tick).hidden)) words(tick, 400);
+  for (const tick of all("#legend-ticks :not([hidden])")) words(tick, 400);
 }

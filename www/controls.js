@@ -34,7 +34,7 @@ const FLIGHTS = { w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], e: [
  *
  * @typedef {{ onHome: () => void, onBox: (box: Promise<number[]>) => void, onClick: (point: Point) => void,
  *   onHover: (point: Point, place: Place) => void, onLeave: () => void,
- *   onSpan: (from: Place, to: Place, points?: [Point, Point]) => void, isFlying: () => boolean }} Actions
+ *   onSpan: (from?: Place, to?: Place, points?: [Point, Point]) => void, isFlying: () => boolean }} Actions
  */
 
 /**
@@ -45,7 +45,7 @@ const FLIGHTS = { w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], e: [
 export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover, onLeave, onSpan, isFlying }) {
   /** The last position of each pressed pointer. @type {Map<number, { x: number, y: number }>} */
   const pointers = new Map();
-  /** The handle that is being dragged, −1 for none, null until `pickRegion` has answered. */
+  /** The handle that is being dragged, −1 for none, null until `pickRegion` has answered. @type {number | null} */
   let handle = -1;
   /** Counts presses: a late answer of `pickRegion` is for an earlier press and must be ignored. */
   let press = 0;
@@ -70,10 +70,10 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
   /** @type {(event: MouseEvent) => Place} */
   const place = (event) => ({ x: event.clientX, y: event.clientY });
 
-  /** Whether the pointer is still where it was pressed. */
-  const isNear = (event) => Math.hypot(event.clientX - began.place.x, event.clientY - began.place.y) <= CLICK;
+  /** Whether the pointer is still where it was pressed. @param {MouseEvent} event @param {Place} from */
+  const isNear = (event, from) => Math.hypot(event.clientX - from.x, event.clientY - from.y) <= CLICK;
 
-  const ignore = (error) => {
+  const ignore = (/** @type {any} */ error) => {
     if (error?.code !== "freed") console.warn(error);
   };
 
@@ -107,12 +107,12 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
     }
     if (began?.spans) return onSpan(began.place, place(event));
     // The picture stays while it may be a click.
-    if (handle === null || (began && isNear(event))) return;
+    if (handle === null || (began && isNear(event, began.place))) return;
     began = undefined;
     const height = canvas.clientHeight;
     const [dx, dy] = [(event.clientX - last.x) / height, (event.clientY - last.y) / height];
-    if (handle >= 0) drag(event);
-    else if (pointers.size === 2) pinch(event, dx, dy);
+    if (handle >= 0) onBox(viewer.dragRegion(handle, ...point(event)));
+    else if (pointers.size === 2) pinch(event, last, dx, dy);
     else if (pointers.size === 1) {
       const moves = event.shiftKey || (event.buttons & 6) !== 0;
       if (moves) viewer.pan(dx, -dy).catch(ignore);
@@ -121,12 +121,13 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
   });
 
+  /** @param {PointerEvent} event @param {number} right @param {number} up */
   function turn(event, right, up) {
     if (isFlying()) return void viewer.look(right, up).catch(ignore);
     const time = Math.max(event.timeStamp - swing.time, 1);
     // The mean over some events: single ones are uneven.
     const part = Math.min(time / THROW, 1);
-    const mean = (before, now) => (1 - part) * before + part * (now / time);
+    const mean = (/** @type {number} */ before, /** @type {number} */ now) => (1 - part) * before + part * (now / time);
     swing = { right: mean(swing.right, right), up: mean(swing.up, up), time: event.timeStamp };
     viewer.orbit(right, up).catch(ignore);
   }
@@ -137,7 +138,7 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
     const mine = ++running;
     let { right, up } = swing;
     let last = performance.now();
-    const step = (now) => {
+    const step = (/** @type {number} */ now) => {
       const time = Math.min(Math.max(now - last, 0), 50);
       last = now;
       if (mine !== running || Math.hypot(right, up) < SLOWEST) return;
@@ -160,20 +161,16 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
     });
   }
 
-  function drag(event) {
-    onBox(viewer.dragRegion(handle, ...point(event)));
-  }
-
-  function pinch(event, dx, dy) {
+  /** @param {PointerEvent} event @param {Place} last where that finger was @param {number} dx @param {number} dy */
+  function pinch(event, last, dx, dy) {
     const [[, other]] = [...pointers].filter(([id]) => id !== event.pointerId);
-    const last = pointers.get(event.pointerId);
-    const distance = (p) => Math.max(8, Math.hypot(p.x - other.x, p.y - other.y));
+    const distance = (/** @type {Place} */ p) => Math.max(8, Math.hypot(p.x - other.x, p.y - other.y));
     viewer.zoom(distance(last) / distance({ x: event.clientX, y: event.clientY })).catch(ignore);
     // The middle between the fingers moves half as far as the one that moved.
     viewer.pan(dx / 2, -dy / 2).catch(ignore);
   }
 
-  async function hover(event) {
+  async function hover(/** @type {PointerEvent} */ event) {
     if (event.pointerType === "touch") return;
     onHover(point(event), place(event));
     if (hovering) return;
@@ -185,21 +182,22 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
 
   canvas.addEventListener("pointerleave", onLeave);
 
-  /** A press has ended: it was a rectangle, a click, or nothing of these. */
+  /** A press has ended: it was a rectangle, a click, or nothing of these. @param {PointerEvent} event */
   function end(event) {
     if (!began) return;
     const { spans, point: from } = began;
-    if (spans) onSpan(undefined, undefined, isNear(event) ? undefined : [from, point(event)]);
-    else if (isNear(event) && (handle === null || handle < 0)) onClick(point(event));
+    const stayed = isNear(event, began.place);
+    if (spans) onSpan(undefined, undefined, stayed ? undefined : [from, point(event)]);
+    else if (stayed && (handle === null || handle < 0)) onClick(point(event));
     began = undefined;
   }
 
-  for (const name of ["pointerup", "pointercancel"]) {
+  for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) {
     canvas.addEventListener(name, (event) => {
       if (name === "pointerup") end(event);
       else if (began?.spans) onSpan(undefined, undefined);
       began = undefined;
-      pointers.delete(/** @type {PointerEvent} */ (event).pointerId);
+      pointers.delete(event.pointerId);
       press++;
       if (handle === -1 && pointers.size === 0 && event.timeStamp - swing.time < THROW) runOut();
       swing = { right: 0, up: 0, time: 0 };
@@ -222,6 +220,7 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
     { passive: false },
   );
 
+  /** @type {Record<string, [number, number]>} */
   const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   canvas.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;

@@ -1,14 +1,14 @@
 /** What has arrived, and what it has bought: the panel of data. */
 
 import { attachBlockMap, showBlockMap } from "./blockmap.js";
-import { $, all } from "./dom.js";
+import { $, all, describe, shape, svg } from "./dom.js";
+import { shownField } from "./fields.js";
 import { count, milliseconds, percentage, size } from "./format.js";
-import { element } from "./overlay.js";
-import { demo, page } from "./page.js";
+import { stateNow } from "./history.js";
+import { note } from "./messages.js";
+import { demo, viewer } from "./page.js";
 import { ticks } from "./plot.js";
-import { applyMode } from "./scene.js";
-import { note } from "./share.js";
-import { stateNow } from "./state.js";
+import { store } from "./state.js";
 import { onTab, shownTab } from "./tabs.js";
 
 /** So many pictures and meshes are remembered. */
@@ -29,6 +29,7 @@ let gpuBytes = 0;
 /** @type {import("tetralod/viewer").ViewerProgress["traffic"]} */
 let traffic;
 /** The file that all this is of. */
+/** @type {typeof demo.info} */
 let of;
 let isDue = false;
 
@@ -50,11 +51,13 @@ export function record(name, detail) {
   });
 }
 
+/** @param {import("./page.js").Stats} stats */
 function mesh({ bytes, relativeErrorBound, tetrahedra }) {
   meshes.push({ bytes, error: relativeErrorBound, tetrahedra, time: Math.round(performance.now()) });
   if (meshes.length > MESHES) meshes.shift();
 }
 
+/** @param {import("tetralod/viewer").ViewerFrame} frame */
 function frame({ milliseconds: time, uploaded: bytes, gpuBytes: held }) {
   gpuBytes = held;
   const now = performance.now();
@@ -67,7 +70,7 @@ function frame({ milliseconds: time, uploaded: bytes, gpuBytes: held }) {
   if (intervals.length > 0) $("frame-time-achieved").textContent = `Achieved: ${milliseconds(quantile(intervals, 0.5))} from one to the next`;
 }
 
-/** The value below which a part of some numbers lies. */
+/** The value below which a part of some numbers lies. @param {number[]} values @param {number} part */
 function quantile(values, part) {
   const sorted = [...values].sort((a, b) => a - b);
   return sorted[Math.min(Math.floor(part * sorted.length), sorted.length - 1)] ?? 0;
@@ -82,17 +85,18 @@ function show() {
 
 /** The bytes that the index of the file states for meshes of the whole volume. @returns {{ bytes: number, error: number }[]} */
 function stated() {
-  const { curve, min, max } = page.field?.own ?? {};
+  if (!demo.info) return [];
+  const { curve, min, max } = shownField().own;
   if (!curve) return [];
   return Array.from(curve.errors, (error, i) => ({ error: error / (max - min || 1), bytes: curve.bytes[i] }));
 }
 
 /** The error against bytes; errors in equal ratios. */
 function showBought() {
-  const svg = $("bought");
+  const chart = svg("bought");
   const good = meshes.filter(({ error, bytes }) => error > 0 && bytes > 0);
-  if (good.length === 0) return svg.replaceChildren();
-  const { clientWidth: width, clientHeight: height } = svg;
+  if (good.length === 0) return chart.replaceChildren();
+  const { clientWidth: width, clientHeight: height } = chart;
   const [left, right, top, bottom] = [52, 12, 8, 34];
   const low = Math.floor(Math.log10(Math.min(...good.map(({ error }) => error))));
   // What the file states for errors down to that scale, so that one sees what more bytes would buy.
@@ -100,25 +104,25 @@ function showBought() {
   const most = Math.max(...[...good, ...near].map(({ bytes }) => bytes)) * 1.04;
   const largest = Math.max(...[...good, ...near].map(({ error }) => error));
   const high = Math.max(Math.ceil(Math.log10(largest)), low + 1);
-  const x = (bytes) => left + (bytes / most) * (width - left - right);
-  const y = (error) => top + ((high - Math.log10(error)) / (high - low)) * (height - top - bottom);
+  const x = (/** @type {number} */ bytes) => left + (bytes / most) * (width - left - right);
+  const y = (/** @type {number} */ error) => top + ((high - Math.log10(error)) / (high - low)) * (height - top - bottom);
   const parts = [];
   for (let power = low; power <= high; power++) {
     const at = y(10 ** power);
-    parts.push(element("line", { x1: left, x2: width - right, y1: at, y2: at, class: "grid" }));
-    parts.push(element("text", { x: left - 6, y: at + 4, class: "y" }, percentage(100 * 10 ** power)));
+    parts.push(shape("line", { x1: left, x2: width - right, y1: at, y2: at, class: "grid" }));
+    parts.push(shape("text", { x: left - 6, y: at + 4, class: "y" }, percentage(100 * 10 ** power)));
   }
   for (const { at } of ticks(0, most, Math.max(2, Math.floor(width / 100)))) {
-    parts.push(element("text", { x: x(at), y: height - bottom + 15 }, at === 0 ? "0" : size(at)));
+    parts.push(shape("text", { x: x(at), y: height - bottom + 15 }, at === 0 ? "0" : size(at)));
   }
-  parts.push(element("text", { x: (left + width - right) / 2, y: height - 4 }, "bytes that have arrived"));
-  const line = (points) => `M${points.map(({ bytes, error }) => `${x(bytes).toFixed(1)} ${y(error).toFixed(1)}`).join("L")}`;
-  if (near.length > 1) parts.push(element("path", { d: line(near), class: "stated" }));
-  parts.push(element("path", { d: line(good) }));
-  parts.push(...good.map(({ bytes, error }) => element("circle", { cx: x(bytes), cy: y(error), r: 2.5 })));
-  svg.replaceChildren(...parts);
+  parts.push(shape("text", { x: (left + width - right) / 2, y: height - 4 }, "bytes that have arrived"));
+  const line = (/** @type {{ bytes: number, error: number }[]} */ points) => `M${points.map(({ bytes, error }) => `${x(bytes).toFixed(1)} ${y(error).toFixed(1)}`).join("L")}`;
+  if (near.length > 1) parts.push(shape("path", { d: line(near), class: "stated" }));
+  parts.push(shape("path", { d: line(good) }));
+  parts.push(...good.map(({ bytes, error }) => shape("circle", { cx: x(bytes), cy: y(error), r: 2.5 })));
+  chart.replaceChildren(...parts);
   const end = good[good.length - 1];
-  svg.setAttribute("aria-label", `Error ${percentage(100 * end.error)} with ${size(end.bytes)}; ${good.length} meshes so far`);
+  chart.setAttribute("aria-label", `Error ${percentage(100 * end.error)} with ${size(end.bytes)}; ${good.length} meshes so far`);
 }
 
 /** Which part of the blocks is here, and which part is needed but is not. */
@@ -146,31 +150,26 @@ function showTraffic() {
     ["First picture", demo.firstFrameMs ? `after ${milliseconds(demo.firstFrameMs)}` : "–"],
     ["Bytes until then", demo.firstFrameBytes ? size(demo.firstFrameBytes) : "–"],
   ];
-  $("traffic").replaceChildren(
-    ...rows.flatMap(([name, value]) => {
-      const [term, description] = [document.createElement("dt"), document.createElement("dd")];
-      [term.textContent, description.textContent] = [name, value];
-      return [term, description];
-    }),
-  );
+  $("traffic").replaceChildren();
+  describe($("traffic"), rows);
 }
 
 /** The times of the last pictures, as bars. */
 function showFrames() {
-  const svg = $("frames");
+  const chart = svg("frames");
   const times = frames.map(({ time }) => time);
-  if (times.length === 0) return svg.replaceChildren();
-  const { clientWidth: width, clientHeight: height } = svg;
+  if (times.length === 0) return chart.replaceChildren();
+  const { clientWidth: width, clientHeight: height } = chart;
   const most = Math.max(...times);
   const wide = width / FRAMES;
-  svg.replaceChildren(
+  chart.replaceChildren(
     ...times.map((time, i) => {
       const high = Math.max((time / most) * (height - 4), 1);
-      return element("rect", { x: i * wide, y: height - high, width: Math.max(wide - 1, 0.5), height: high });
+      return shape("rect", { x: i * wide, y: height - high, width: Math.max(wide - 1, 0.5), height: high });
     }),
   );
   const words = `Worker: ${milliseconds(quantile(times, 0.5))} in the middle, ${milliseconds(quantile(times, 0.95))} at most for 95 %, of the last ${times.length} pictures`;
-  svg.setAttribute("aria-label", words);
+  chart.setAttribute("aria-label", words);
   $("frames-words").textContent = words;
 }
 
@@ -190,18 +189,14 @@ export function report() {
     gpuBytes,
     meshes,
     frames,
-    gpu: page.viewer.adapter,
+    gpu: viewer().adapter,
     browser: navigator.userAgent,
   };
 }
 
-/** Shows the tetrahedra, coloured by what there is of the file. */
+/** Shows the tetrahedra, coloured by what there is of the file. @param {"block" | "missing"} colourBy */
 function map(colourBy) {
-  $("colour-by").value = colourBy;
-  const radio = /** @type {HTMLInputElement} */ (document.querySelector("[name=mode][value=mesh]"));
-  radio.checked = true;
-  $("shape").value = "solid";
-  applyMode();
+  store.change({ view: "mesh", "colour-by": colourBy, shape: "solid" });
 }
 
 export function attachData() {

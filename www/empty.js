@@ -1,33 +1,24 @@
 /** What is said, and can be done, where the picture shows nothing. */
 
+import { FIRST, pointsOf } from "./curve.js";
 import { $ } from "./dom.js";
+import { isovalue, isovaluePart, setIsovalue, shownField } from "./fields.js";
 import { rounded } from "./format.js";
-import { demo, page } from "./page.js";
+import { demo, volume } from "./page.js";
 import { beside, mode } from "./parts.js";
-import { cutsAll, moveToMiddle, placeOfPlane, span } from "./planes.js";
-import { applyRegion, cutBox } from "./region.js";
-import { applyCut, isovalue, setIsovalue } from "./scene.js";
+import { cutsAll, movePlane, placeOfPlane, span } from "./planes.js";
+import { cutBox } from "./region.js";
+import { LOOKS } from "./scene.js";
+import { store } from "./state.js";
 
-/** @typedef {{ words: string, label?: string, act?: () => void }} Reason what is wrong, and what a button does about it */
+/** @typedef {{ words: string, label: string, act: () => void }} Reason what is wrong, and what a button does about it */
 
 /** Whether the last frame showed no triangle. */
 let frameIsEmpty = false;
 
-const middleOfPlane = {
-  label: "Move the plane to the middle",
-  act() {
-    moveToMiddle();
-    applyCut();
-  },
-};
+const middleOfPlane = { label: "Move the plane to the middle", act: () => movePlane() };
 
-const whole = {
-  label: "Show what is outside, too",
-  act() {
-    $("inside").checked = false;
-    applyRegion();
-  },
-};
+const whole = { label: "Show what is outside, too", act: () => store.change({ inside: false }) };
 
 function useMiddleOfRange() {
   setIsovalue(0.5);
@@ -37,7 +28,7 @@ function useMiddleOfRange() {
 /** Why a view whose surface has no triangle shows none. @type {Record<string, () => Reason>} */
 const MISSED = {
   iso() {
-    const { name, min, max } = page.field;
+    const { name, min, max } = shownField();
     const [value, low, high] = [isovalue(), min, max].map((x) => rounded(x, max - min));
     const isOutside = isovalue() < min || isovalue() > max;
     const words = isOutside ? `${value} is outside of the range of ${name}, ${low} to ${high}` : `${name} does not pass ${value} in this mesh`;
@@ -59,15 +50,15 @@ function cutAway() {
   if (["solid", "mesh"].includes(mode()) && cutsAll()) {
     return { words: `Everything is cut away: the model lies between ${"xyz"[axis]} = ${from} and ${to}.`, ...middleOfPlane };
   }
-  if (mode() === "volume" && page.transfer.isTransparent) {
-    return { words: "The volume is transparent: no value has an opacity.", label: "Use the ramp", act: () => page.transfer.begin() };
+  if (mode() === "volume" && pointsOf(store.state.transfer, isovaluePart()).every(([, opacity]) => opacity === 0)) {
+    return { words: "The volume is transparent: no value has an opacity.", label: "Use the ramp", act: () => store.change({ transfer: FIRST }) };
   }
   return undefined;
 }
 
-/** Whether a box with a volume has a part in common with the model. */
+/** Whether a box with a volume has a part in common with the model. @param {import("./volume.js").Box} box */
 function meetsModel(box) {
-  const { bounds } = demo.info;
+  const { bounds } = volume();
   return [0, 1, 2].every((i) => box[i] < box[i + 3] && box[i] < bounds[i + 3] && box[i + 3] > bounds[i]);
 }
 
@@ -78,7 +69,7 @@ export function noteEmpty({ ready, triangles }) {
 }
 
 /** Another picture is on its way. */
-export function expectFrame() {
+function expectFrame() {
   frameIsEmpty = false;
   showEmpty();
 }
@@ -88,7 +79,7 @@ let reason;
 
 /** Says so where nothing is seen and no step may yet change that: the last step may come before or after the last frame. */
 export function showEmpty() {
-  const isSettled = page.field !== undefined && demo.step?.done === true && demo.info !== undefined;
+  const isSettled = demo.step?.done === true && demo.info !== undefined;
   reason = isSettled && beside().length === 0 ? (cutAway() ?? (frameIsEmpty ? MISSED[mode()]?.() : undefined)) : undefined;
   $("empty").hidden = !reason;
   if (!reason) return;
@@ -98,4 +89,6 @@ export function showEmpty() {
 
 export function attachEmpty() {
   $("empty-act").addEventListener("click", () => reason?.act());
+  store.subscribe(LOOKS, expectFrame);
+  store.subscribe(["region", "inside", "box"], showEmpty);
 }

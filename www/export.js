@@ -1,19 +1,20 @@
 /** Files made of what is shown: the picture, the mesh, surfaces, probes. */
 
 import { absolute } from "tetralod/viewer";
-import { $, all } from "./dom.js";
-import { count } from "./format.js";
-import { fail } from "./messages.js";
-import { demo, page } from "./page.js";
 import { compose } from "./compose.js";
+import { $, all, button, input, select } from "./dom.js";
+import { isovalue, shownField } from "./fields.js";
+import { count } from "./format.js";
 import { showIdle } from "./idle.js";
-import { volumeName } from "./opening.js";
+import { fail, note } from "./messages.js";
+import { demo, page, viewer } from "./page.js";
 import { placeOfPlane, plane, span } from "./planes.js";
-import { draw, isovalue } from "./scene.js";
-import { note } from "./share.js";
+import { draw } from "./scene.js";
+import { volumeName } from "./source.js";
 import { onTab } from "./tabs.js";
 import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "./writers.js";
 
+/** @param {string} name @param {BlobPart[]} parts @param {string} type */
 function saveAs(name, parts, type) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob(parts, { type }));
@@ -25,11 +26,10 @@ function saveAs(name, parts, type) {
 
 /** The triangles that are chosen. @returns {Promise<import("tetralod").Surface & { normals?: Float32Array }>} */
 async function triangles(how = {}) {
-  const { viewer } = page;
-  const kind = $("surface-kind").value;
-  if (kind === "isosurface") return viewer.isosurface(isovalue(), how);
+  const kind = select("surface-kind").value;
+  if (kind === "isosurface") return viewer().isosurface(isovalue(), how);
   const { normal, offset } = plane();
-  return kind === "slice" ? viewer.slice(normal, offset, how) : viewer.surface(how);
+  return kind === "slice" ? viewer().slice(normal, offset, how) : viewer().surface(how);
 }
 
 /** How long the colours of the field are waited for (in ms). */
@@ -37,19 +37,20 @@ const PATIENCE = 5000;
 
 /** The colours of the field that is shown; nothing where they cannot be had. @returns {Promise<import("tetralod/viewer").Legend | undefined>} */
 async function legend() {
-  const { viewer, field } = page;
-  if (viewer.legend?.label === field.name) return viewer.legend;
+  const { name } = shownField();
+  if (viewer().legend?.label === name) return viewer().legend;
+  /** @type {Promise<import("tetralod/viewer").Legend | undefined>} */
   const heard = new Promise((resolve) => {
-    viewer.addEventListener("legend", ({ detail }) => resolve(detail), { once: true });
+    viewer().addEventListener("legend", ({ detail }) => resolve(detail), { once: true });
     setTimeout(resolve, PATIENCE);
   });
   // A section outside of the model brings the colours of the field into the picture, and nothing else.
   const { high, low } = span();
   const outside = { ...plane(), offset: Math.max(Math.abs(high), Math.abs(low)) * 2 + (high - low) };
-  await viewer.set({ slices: [...(viewer.state.slices ?? []), outside] });
-  const found = /** @type {import("tetralod/viewer").Legend | undefined} */ (await heard);
+  await viewer().set({ slices: [...(viewer().state.slices ?? []), outside] });
+  const found = await heard;
   draw();
-  return found?.label === field.name ? found : undefined;
+  return found?.label === name ? found : undefined;
 }
 
 /** The triangles that are chosen, with the colours that their values have. */
@@ -64,15 +65,16 @@ async function probes() {
   if (pins.length === 0) return undefined;
   const names = Object.keys(pins[0].values);
   const head = ["what", "x", "y", "z", "distance", ...names];
-  const row = (what, position, distance, values) => [what, ...position, distance, ...names.map((name) => values[name])];
-  const distance = (to) => Math.hypot(...to.map((x, i) => x - pins[0].position[i]));
-  const rows = pins.map(({ position, values }, i) => row(`probe ${"AB"[i]}`, position, distance(position), values));
+  /** @param {string} what @param {number[]} position @param {Record<string, number>} values @returns {(string | number | undefined)[]} */
+  const row = (what, position, values) => [what, ...position, distance(position), ...names.map((name) => values[name])];
+  const distance = (/** @type {number[]} */ to) => Math.hypot(...to.map((x, i) => x - pins[0].position[i]));
+  const rows = pins.map(({ position, values }, i) => row(`probe ${"AB"[i]}`, position, values));
   if (pins.length < 2) return csv([head, ...rows]);
   const [from, to] = pins.map(({ position }) => position);
-  const { at, values } = await page.viewer.line(from, to);
+  const { at, values } = await viewer().line(from, to);
   const onLine = Array.from(at, (part, i) => {
     const position = from.map((x, axis) => x + part * (to[axis] - x));
-    return row("line", position, distance(position), { [page.field.name]: values[i] });
+    return row("line", position, { [shownField().name]: values[i] });
   });
   return csv([head, ...rows, ...onLine]);
 }
@@ -82,8 +84,8 @@ const ALL = { fields: true };
 
 /** How each file is made. @type {Record<string, () => Promise<[parts: BlobPart[] | undefined, type: string]>>} */
 const MAKERS = {
-  vtu: async () => [vtu(absolute(await page.viewer.mesh(ALL)), page.field.number), "application/xml"],
-  vtk: async () => [vtk(absolute(await page.viewer.mesh(ALL)), page.field.number), "application/octet-stream"],
+  vtu: async () => [vtu(absolute(await viewer().mesh(ALL)), shownField().number), "application/xml"],
+  vtk: async () => [vtk(absolute(await viewer().mesh(ALL)), shownField().number), "application/octet-stream"],
   stl: async () => [stl(await triangles()), "model/stl"],
   ply: async () => [ply(absolute(await triangles(ALL))), "application/octet-stream"],
   glb: async () => [glb(await coloured()), "model/gltf-binary"],
@@ -96,29 +98,29 @@ const SURFACES = {
   slice: () => `section-${"xyz"[span().axis]}-${Number(placeOfPlane().toPrecision(6))}`,
   boundary: () => "boundary",
 };
-const surfaceName = () => SURFACES[$("surface-kind").value]();
+const surfaceName = () => SURFACES[select("surface-kind").value]();
 /** What comes behind the name of the volume in that of a file. @type {Record<string, () => string>} */
 const NAMES = { stl: surfaceName, ply: surfaceName, glb: surfaceName, csv: () => "probes" };
 
-/** The name of a file that is made of the volume. */
+/** The name of a file that is made of the volume. @param {string | undefined} words @param {string} ending */
 const fileName = (words, ending) => `${[volumeName(), ...(words ? [words] : [])].join("-").replaceAll(/[\\/:*?"<>|]/g, "_")}.${ending}`;
 
-async function exportAs(kind) {
+async function exportAs(/** @type {string} */ kind) {
   if (!demo.info) return;
   const [parts, type] = await MAKERS[kind]();
   if (!parts) return note("There is no probe: click on the picture first");
   saveAs(fileName(NAMES[kind]?.(), kind), parts, type);
 }
 
-async function savePicture(canvas) {
-  const factor = Number($("shot-scale").value) * devicePixelRatio;
+async function savePicture(/** @type {HTMLCanvasElement} */ canvas) {
+  const factor = Number(select("shot-scale").value) * devicePixelRatio;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * factor));
-  const picture = await page.viewer.screenshot({ width, height });
-  const all = $("shot-overlay").checked ? await compose(picture, { width, height, canvas }) : picture;
+  const picture = await viewer().screenshot({ width, height });
+  const all = input("shot-overlay").checked ? await compose(picture, { width, height, canvas }) : picture;
   saveAs(fileName(`${width}x${height}`, "png"), [all], "image/png");
 }
 
-/** Runs what a button is for, which may take a while. */
+/** Runs what a button is for, which may take a while. @param {HTMLButtonElement} button @param {() => Promise<unknown>} act */
 function onPress(button, act) {
   button.addEventListener("click", async () => {
     button.disabled = true;
@@ -130,8 +132,8 @@ function onPress(button, act) {
 
 /** @param {HTMLCanvasElement} canvas */
 export function attachExport(canvas) {
-  onPress($("shot"), () => savePicture(canvas));
-  for (const button of all("[data-export]")) onPress(button, () => exportAs(button.dataset.export));
+  onPress(button("shot"), () => savePicture(canvas));
+  for (const button of /** @type {HTMLButtonElement[]} */ (all("[data-export]"))) onPress(button, () => exportAs(button.dataset.export ?? ""));
   onTab((name) => {
     if (name !== "export" || !demo.step) return;
     $("mesh-words").textContent = `The mesh as it is shown: ${count(demo.step.tetrahedra)} tetrahedra with all fields`;

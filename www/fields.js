@@ -1,107 +1,118 @@
-/** Which field is shown, at which time, and the time steps that follow each other by themselves. */
+/** Which field is shown, at which time, and which of its values is the isovalue. */
 
 import { percentilesOf, rebinned } from "./bins.js";
-import { $, text } from "./dom.js";
-import { fail } from "./messages.js";
-import { demo, page } from "./page.js";
-import { refine } from "./request.js";
-import { applyIsovalue } from "./scene.js";
+import { $, input, select, text } from "./dom.js";
+import { precise, rounded } from "./format.js";
+import { demo, volume } from "./page.js";
+import { store } from "./state.js";
+import { fieldNames, rangeOf, stepsOf, vectors } from "./volume.js";
 
-/** How long a time step is shown at least (in ms). */
-const STEP_TIME = 150;
+/**
+ * A field at one of its times. `min` and `max` are over all times, and the histogram is of that range, so that values and colours mean
+ * the same at all of them; `number` is its place in the list of the volume, `own` what that says of it.
+ *
+ * @typedef {import("tetralod").FieldInfo & { number: number, own: import("tetralod").FieldInfo }} ShownField
+ */
 
-/** Fields by name: the numbers of their time steps, or one. @type {Map<string, number[]>} */
-let fields = new Map();
-let playing = false;
+/** The isovalue has so many digits: as many as links keep. */
+const DIGITS = 6;
 
-/** Another file is shown. @param {import("tetralod").FieldInfo[]} all */
-export function setFields(all) {
-  stop();
-  fields = new Map();
-  all.forEach(({ name }, number) => fields.set(name, [...(fields.get(name) ?? []), number]));
-  for (const steps of fields.values()) steps.sort((a, b) => all[a].time - all[b].time);
-  $("field").replaceChildren(...[...fields.keys()].map((name) => new Option(name, name)));
-  $("surface-colour").replaceChildren(new Option("two sides", ""), ...[...fields.keys()].map((name) => new Option(name, name)));
-  $("field-row").hidden = fields.size < 2;
-  $("time").max = Math.max(...[...fields.values()].map((steps) => steps.length)) - 1;
-  $("time").value = 0;
-}
-
-/** The smallest and the largest value of a field at all of its times. @param {string} name @returns {[number, number]} */
-export function rangeOf(name) {
-  const steps = demo.info.fields.filter((field) => field.name === name);
-  return [Math.min(...steps.map(({ min }) => min)), Math.max(...steps.map(({ max }) => max))];
-}
-
-/** A field of the file, as the page shows it. @param {number} number @returns {import("./page.js").ShownField} */
-function shownField(number) {
-  const own = demo.info.fields[number];
+/** A field of the file, as the page shows it. @param {number} number @returns {ShownField} */
+function asShown(number) {
+  const own = volume().fields[number];
   const [min, max] = rangeOf(own.name);
   const histogram = own.histogram && /** @type {any} */ (rebinned(own.histogram, [own.min, own.max], [min, max]));
   return { ...own, min, max, histogram, number, own };
 }
 
-/** The values below which some fractions of the volume lie, at all times together; undefined where the file has no histograms. */
-export function percentilesAtAllTimes(fractions) {
-  const steps = (fields.get(page.field.name) ?? []).map((number) => shownField(number).histogram);
-  if (!steps.every(Boolean)) return undefined;
-  const sums = steps.reduce((sum, histogram) => sum.map((volume, i) => volume + histogram[i]));
-  return percentilesOf(sums, [page.field.min, page.field.max], fractions);
+/** @type {ShownField | undefined} */
+let last;
+
+/** The field that is shown, at its time. Only asked for while a volume is open. @returns {ShownField} */
+export function shownField() {
+  const number = stepsOf(store.state.field)[store.state.time];
+  if (last?.own !== volume().fields[number]) last = asShown(number);
+  return /** @type {ShownField} */ (last);
 }
 
-/** Reads the field and the time step from the settings. */
-export function chooseField() {
-  const steps = fields.get($("field").value);
-  $("time").max = steps.length - 1;
-  $("time-row").hidden = steps.length < 2;
-  if ($("time").value >= steps.length) $("time").value = 0;
-  const field = (page.field = shownField(steps[$("time").value]));
-  page.transfer.field = field;
-  page.colours.setField(field).catch(fail);
-  if (field.time !== undefined) text("time-text", String(Number(field.time.toPrecision(6))), "time");
-  applyIsovalue();
+/** The values below which some fractions of the volume lie, at all times together; undefined where the file has no histograms. @param {number[]} fractions */
+export function percentilesAtAllTimes(fractions) {
+  const { name, min, max } = shownField();
+  const steps = stepsOf(name).flatMap((number) => asShown(number).histogram ?? []);
+  if (steps.length < stepsOf(name).length) return undefined;
+  const sums = steps.reduce((sum, histogram) => sum.map((volume, i) => volume + histogram[i]));
+  return percentilesOf(sums, [min, max], fractions);
 }
 
 /** While steps follow each other: the number of the field at the one that comes next. */
 export function followingStep() {
-  if (!playing) return undefined;
-  const steps = fields.get(page.field.name);
-  return steps[(steps.indexOf(page.field.number) + 1) % steps.length];
+  const steps = stepsOf(store.state.field);
+  return store.state.playing ? steps[(store.state.time + 1) % steps.length] : undefined;
 }
 
-export const isPlaying = () => playing;
-
-/** Shows the time steps one after the other, each when the mesh of the one before is complete. */
-function play() {
-  playing = true;
-  showPlaying();
-  nextStep();
+/** In units of the field. */
+export function isovalue() {
+  const { min, max } = shownField();
+  return store.state.isovalue ?? (min + max) / 2;
 }
 
-function stop() {
-  playing = false;
-  showPlaying();
+/** Where the isovalue is in the field's range, 0 to 1. */
+export function isovaluePart() {
+  if (!demo.info) return 0.5;
+  const { min, max } = shownField();
+  return max > min ? Math.min(Math.max((isovalue() - min) / (max - min), 0), 1) : 0.5;
 }
 
-function showPlaying() {
-  $("play").textContent = playing ? "Pause" : "Play";
-  $("play").setAttribute("aria-pressed", String(playing));
+/** Takes an isovalue at a fraction of the field's range. @param {number} part */
+export function setIsovalue(part) {
+  if (!demo.info) return;
+  const { min, max } = shownField();
+  store.change({ isovalue: precise(min + Math.min(Math.max(part, 0), 1) * (max - min), max - min, DIGITS) });
 }
 
-async function nextStep() {
-  const shownFor = new Promise((resolve) => setTimeout(resolve, STEP_TIME));
-  $("time").value = (Number($("time").value) + 1) % (Number($("time").max) + 1);
-  chooseField();
-  await Promise.all([refine(), shownFor]);
-  if (playing) nextStep();
+/** The isovalue in words, which may be one of the volume before: values carry over. */
+export function isovalueWords() {
+  const { min, max, unit } = shownField();
+  return `${rounded(isovalue(), max - min)} ${unit}`.trim();
+}
+
+/** Another file is shown. */
+export function listFields() {
+  const options = () => fieldNames().map((name) => new Option(name, name));
+  select("field").replaceChildren(...options());
+  select("surface-colour").replaceChildren(new Option("two sides", ""), ...options());
+  select("vector").replaceChildren(...[...vectors().keys()].map((name) => new Option(name, name)));
+  $("field-row").hidden = options().length < 2;
+}
+
+function showField() {
+  if (!demo.info) return;
+  const { field, time } = store.state;
+  select("field").value = field;
+  select("surface-colour").value = store.state["surface-colour"];
+  select("vector").value = store.state.vector;
+  input("time").max = String(stepsOf(field).length - 1);
+  input("time").value = String(time);
+  $("time-row").hidden = stepsOf(field).length < 2;
+  const at = shownField().time;
+  if (at !== undefined) text("time", String(Number(at.toPrecision(6))));
+}
+
+function showIsovalue() {
+  if (!demo.info) return;
+  input("isovalue").value = String(1000 * isovaluePart());
+  text("isovalue", isovalueWords());
 }
 
 export function attachFields() {
-  $("play").addEventListener("click", () => (playing ? stop() : play()));
-  for (const id of ["field", "time"]) {
-    $(id).addEventListener("input", () => {
-      chooseField();
-      refine();
-    });
-  }
+  select("field").addEventListener("input", () => {
+    const { range } = store.state;
+    // A range that was typed is one of the field before.
+    store.change({ field: select("field").value, range: Array.isArray(range) ? "data" : range });
+  });
+  for (const id of /** @type {const} */ (["surface-colour", "vector"])) select(id).addEventListener("input", () => store.change({ [id]: select(id).value }));
+  input("time").addEventListener("input", () => store.change({ time: input("time").valueAsNumber }));
+  input("isovalue").addEventListener("input", () => setIsovalue(input("isovalue").valueAsNumber / 1000));
+  store.subscribe(["field", "time", "surface-colour", "vector"], showField);
+  store.subscribe(["field", "time", "isovalue"], showIsovalue);
 }

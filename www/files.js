@@ -1,7 +1,7 @@
 /** Volumes of the user: chosen, or dropped on the page. */
 
 import { takeMesh } from "./build.js";
-import { $ } from "./dom.js";
+import { $, dialog, input } from "./dom.js";
 import { say } from "./messages.js";
 import { open, openBuilt } from "./opening.js";
 
@@ -17,7 +17,7 @@ const READ_BY_COMMAND = "VTKHDF, Exodus II, lists of files (.pvtu, .pvd), Gmsh, 
 /** Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of. @param {File[]} files */
 export async function takeFiles(files) {
   if (files.length === 0) return;
-  $("gallery").close();
+  dialog("gallery").close();
   if (takeMesh(files, (built) => openBuilt(built, files))) return;
   const [file] = files;
   // An empty file, and one that cannot be read, are for whoever opens them.
@@ -35,16 +35,16 @@ function wordsFor(name) {
 }
 
 /** As a shell takes it. */
-const quoted = (name) => (/^[\w.+-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`);
+const quoted = (/** @type {string} */ name) => (/^[\w.+-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`);
 
 export function attachFiles() {
-  $("choose").addEventListener("click", () => $("file").click());
-  $("file").addEventListener("change", () => {
-    const files = [...$("file").files];
-    $("file").value = "";
+  $("choose").addEventListener("click", () => input("file").click());
+  input("file").addEventListener("change", () => {
+    const files = [...(input("file").files ?? [])];
+    input("file").value = "";
     takeFiles(files);
   });
-  const carriesFile = (event) => event.dataTransfer?.types.includes("Files");
+  const carriesFile = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes("Files");
   window.addEventListener("dragover", (event) => {
     if (!carriesFile(event)) return;
     event.preventDefault();
@@ -57,6 +57,6 @@ export function attachFiles() {
     $("drop").hidden = true;
     if (!carriesFile(event)) return;
     event.preventDefault();
-    takeFiles([...event.dataTransfer.files]);
+    takeFiles([...(event.dataTransfer?.files ?? [])]);
   });
 }

@@ -3,10 +3,11 @@
  * page looks for a new one now and then: large volumes may still be in the making.
  */
 
-import { $ } from "./dom.js";
+import { $, dialog, element, input, select } from "./dom.js";
 import { count, size, vtuBytes } from "./format.js";
-import { open, sourceWords } from "./opening.js";
-import { note } from "./share.js";
+import { note } from "./messages.js";
+import { open } from "./opening.js";
+import { openSource } from "./source.js";
 import { read } from "./state.js";
 import { pictureOf, taken, takePicture } from "./thumbnails.js";
 
@@ -32,6 +33,7 @@ const LOOK = 15_000;
 let volumes = [];
 /** @type {{ title: string, isShown: boolean }[]} */
 let pending = [];
+/** @type {ReturnType<typeof setTimeout> | undefined} */
 let timer;
 
 /** Reads the list; resolves to the volume that is shown where no address says another one. @returns {Promise<Listed | undefined>} */
@@ -52,27 +54,28 @@ export async function readVolumes() {
   return volumes[0];
 }
 
-/** The picture of a volume before it has arrived. */
+/** The picture of a volume before it has arrived. @param {string} url */
 export function showPoster(url) {
   const volume = listed(url);
   const picture = volume && (volume.picture ?? taken(volume));
-  $("poster").hidden = !picture;
-  if (picture) $("poster").src = picture;
+  const poster = $("poster", HTMLImageElement);
+  poster.hidden = !picture;
+  if (picture) poster.src = picture;
 }
 
-const listed = (url) => volumes.find((volume) => volume.url === url);
+const listed = (/** @type {unknown} */ url) => volumes.find((volume) => volume.url === url);
 
-/** The words of the scene with which a volume is shown first. */
+/** The words of the scene with which a volume is shown first. @param {string} [url] */
 export const sceneOf = (url) => read(listed(url)?.scene ?? "");
 
-/** A volume has been shown: whoever made it may have had no GPU to draw a picture of it. */
+/** A volume has been shown: whoever made it may have had no GPU to draw a picture of it. @param {unknown} url */
 export async function shown(url) {
   const isNew = await takePicture(listed(url)).catch(() => false);
   // The list that is open is made again when it is opened the next time.
-  if (isNew && !$("gallery").open) showGallery();
+  if (isNew && !dialog("gallery").open) showGallery();
 }
 
-/** Says that the volume which is shown first is there now. */
+/** Says that the volume which is shown first is there now. @param {Set<string>} before */
 function announceNew(before) {
   const [first] = volumes;
   if (before.has(first.url)) return;
@@ -81,12 +84,12 @@ function announceNew(before) {
 
 /** The list of data sets. What is open and not in it stays. */
 function showList() {
-  const list = $("volume");
-  const other = list.querySelector("[data-other]");
+  const list = select("volume");
+  const other = /** @type {HTMLOptionElement | null} */ (list.querySelector("[data-other]"));
   const chosen = other ? other.dataset.other : list.value;
   const isListed = volumes.some(({ url }) => url === chosen);
   list.replaceChildren(...volumes.map(({ url, title }) => new Option(title, url)), ...(other && !isListed ? [other] : []));
-  if (isListed) list.value = chosen;
+  if (isListed) list.value = chosen ?? "";
 }
 
 function showGallery() {
@@ -100,44 +103,37 @@ function showGallery() {
 /** @param {Listed} volume */
 function card(volume) {
   const { title, sentence, tetrahedra, bytes } = volume;
-  const [item, button] = [document.createElement("li"), document.createElement("button")];
-  button.type = "button";
-  const image = document.createElement("img");
-  Object.assign(image, { src: pictureOf(volume), alt: "", width: 480, height: 300, loading: "lazy" });
-  button.append(image);
-  const [name, words, sizes] = ["b", "span", "small"].map((tag) => document.createElement(tag));
-  name.textContent = title;
-  words.textContent = sentence;
   // Numbers stay with their units.
-  const amount = (number) => size(number).replace(" ", "\u00a0");
-  sizes.textContent = `${count(tetrahedra)} tetrahedra, ${amount(vtuBytes(volume))} as VTU, ${amount(bytes)} as MT`;
-  button.append(name, words, sizes);
+  const amount = (/** @type {number} */ bytes) => size(bytes).replace(" ", "\u00a0");
+  const sizes = `${count(tetrahedra)} tetrahedra, ${amount(vtuBytes(volume))} as VTU, ${amount(bytes)} as MT`;
+  const image = element("img", { src: pictureOf(volume), alt: "", width: 480, height: 300, loading: "lazy" });
+  const words = [element("b", {}, title), element("span", {}, sentence), element("small", {}, sizes)];
+  const button = element("button", { type: "button" }, image, ...words);
   button.addEventListener("click", () => openListed(volume));
-  item.append(button);
-  return item;
+  return element("li", {}, button);
 }
 
 /** @param {Listed} volume */
 function openListed({ url, scene }) {
-  $("gallery").close();
+  dialog("gallery").close();
   open(url, { url, ...read(scene) });
 }
 
 export function openGallery() {
   readVolumes();
-  $("gallery").showModal();
+  dialog("gallery").showModal();
 }
 
 export function attachGallery() {
-  $("volume").addEventListener("change", () => open($("volume").value));
+  $("volume").addEventListener("change", () => open(select("volume").value));
   $("open-gallery").addEventListener("click", openGallery);
   $("open-url").addEventListener("submit", (event) => {
     event.preventDefault();
-    const url = $("url").value.trim();
+    const url = input("url").value.trim();
     if (!url) return;
-    $("gallery").close();
+    dialog("gallery").close();
     open(url);
   });
   // A new volume may be there when the user comes back.
-  window.addEventListener("focus", () => sourceWords() !== undefined && readVolumes());
+  window.addEventListener("focus", () => openSource() !== undefined && readVolumes());
 }

@@ -1,35 +1,44 @@
 /** The histogram of the field above the slider of the isovalue: a press or a drag on it chooses the isovalue. */
 
 import { histogramPath, isLogarithmic, SIZE } from "./bins.js";
-import { $, all } from "./dom.js";
-import { page } from "./page.js";
-import { setIsovalue } from "./scene.js";
+import { $, all, svg } from "./dom.js";
+import { isovaluePart, setIsovalue, shownField } from "./fields.js";
+import { fail } from "./messages.js";
+import { demo, page, viewer } from "./page.js";
+import { store } from "./state.js";
 
 const { width: WIDTH, margin: MARGIN } = SIZE;
 
-/** @param {ArrayLike<number>} volumes the volume of the mesh in each of equal bins of the field's range */
-export function showVolumes(volumes) {
-  $("histogram-volumes").setAttribute("d", histogramPath(volumes));
+/** Shows the histogram of the field where the isovalue and the transfer function are chosen. */
+export async function showHistogram() {
+  if (!["iso", "volume"].includes(store.state.view) || !demo.info) return;
+  // That of the file is of the reference mesh; without it, that of the mesh which is shown.
+  const { min, max, histogram: known } = shownField();
+  const volumes = known ?? (await viewer().stats({ bins: 100, range: [min, max] })).histogram;
+  page.transfer.volumes = volumes;
+  $("histogram-volumes", SVGPathElement).setAttribute("d", histogramPath(volumes));
   const words = `Volume of each value, as ${isLogarithmic(volumes) ? "logarithms" : "square roots"}`;
   for (const note of all(".histogram-note")) note.textContent = words;
 }
 
-/** Shows where the isovalue is. @param {number} fraction of the field's range */
-export function showHistogramLine(fraction) {
-  const x = MARGIN + fraction * (WIDTH - 2 * MARGIN);
-  for (const name of ["x1", "x2"]) $("histogram-line").setAttribute(name, x);
+/** Shows where the isovalue is. */
+function showLine() {
+  const x = String(MARGIN + isovaluePart() * (WIDTH - 2 * MARGIN));
+  for (const name of ["x1", "x2"]) $("histogram-line", SVGLineElement).setAttribute(name, x);
 }
 
 export function attachHistogram() {
-  const svg = $("histogram");
-  const take = ({ clientX }) => {
-    const { left, width } = svg.getBoundingClientRect();
+  const shown = svg("histogram");
+  const take = (/** @type {PointerEvent} */ { clientX }) => {
+    const { left, width } = shown.getBoundingClientRect();
     const x = ((clientX - left) / width) * WIDTH;
-    if (page.field) setIsovalue(Math.min(Math.max((x - MARGIN) / (WIDTH - 2 * MARGIN), 0), 1));
+    setIsovalue((x - MARGIN) / (WIDTH - 2 * MARGIN));
   };
-  svg.addEventListener("pointerdown", (event) => {
-    svg.setPointerCapture(event.pointerId);
+  shown.addEventListener("pointerdown", (event) => {
+    shown.setPointerCapture(event.pointerId);
     take(event);
   });
-  svg.addEventListener("pointermove", (event) => event.buttons & 1 && take(event));
+  shown.addEventListener("pointermove", (event) => event.buttons & 1 && take(event));
+  store.subscribe(["isovalue", "field", "time"], showLine);
+  store.subscribe(["view", "field", "time"], () => showHistogram().catch(fail));
 }

@@ -1,10 +1,13 @@
 /** Controls that do nothing now: they are disabled, and say why. */
 
+import { comparison } from "./compare.js";
 import { $, all } from "./dom.js";
-import { demo, page } from "./page.js";
+import { demo } from "./page.js";
 import { beside, mode, opacityOf } from "./parts.js";
+import { store } from "./state.js";
+import { rangeOf, vectors } from "./volume.js";
 
-/** Whether a part of the picture has an opaque surface, on which shade can fall. */
+/** Whether a part of the picture has an opaque surface, on which shade can fall. @param {string} name */
 function isOpaque(name) {
   // Around other parts, the boundary is transparent.
   if (name === "solid" && mode() !== "solid") return false;
@@ -14,30 +17,29 @@ function isOpaque(name) {
 /** Why each control does nothing now; nothing where it does something. @returns {Record<string, string | false | undefined>} */
 function reasons() {
   const isWhole = demo.info !== undefined && !demo.blocks && "This file comes as a whole, not in blocks";
-  const isDifference = page.comparison.state?.difference && "Differences have colours and a range of their own";
-  const isSolid = mode() !== "mesh" || $("shape").value === "solid";
+  const isDifference = comparison()?.difference && "Differences have colours and a range of their own";
+  const isSolid = mode() !== "mesh" || store.state.shape === "solid";
   const none = "There is no probe: click on the picture first";
   return {
     shrink: !isSolid && "Only solids are shrunk",
     edges: !isSolid && "Wires and points have no edges besides",
     shade: ![mode(), ...beside()].some(isOpaque) && "Nothing in the picture is opaque: shade falls on surfaces",
     map: isDifference,
-    log: isDifference || (page.field?.max <= 0 && "Logarithms need positive values, and the field has none"),
+    log: isDifference || (rangeOf(store.state.field)[1] <= 0 && "Logarithms need positive values, and the field has none"),
     "range-preset": isDifference,
     "range-low": isDifference,
     "range-high": isDifference,
-    "also-flow": $("flow").disabled && "This dataset has no vectors",
+    "also-flow": vectors().size === 0 && "This dataset has no vectors",
     "map-blocks": isWhole,
     "map-missing": isWhole,
-    csv: page.probes.pins.length === 0 && none,
+    csv: store.state.probes.length === 0 && none,
   };
 }
 
-/** Disables a control for a reason, or enables it. @param {any} control @param {string | false | undefined} reason */
+/** Disables a control for a reason, or enables it. @param {Element} control @param {string | false | undefined} reason */
 function setIdle(control, reason) {
-  control.disabled = Boolean(reason);
-  const label = control.closest("label") ?? control;
-  label.title = reason || "";
+  control.toggleAttribute("disabled", Boolean(reason));
+  (control.closest("label") ?? control).setAttribute("title", reason || "");
   if (reason) control.setAttribute("aria-description", reason);
   else control.removeAttribute("aria-description");
 }
@@ -47,6 +49,8 @@ export function showIdle() {
   if (!demo.info) return;
   const { csv, ...others } = reasons();
   for (const [id, reason] of Object.entries(others)) setIdle($(id), reason);
-  setIdle(all("[data-export=csv]")[0], csv);
+  for (const button of all("[data-export=csv]")) setIdle(button, csv);
   for (const option of all("#colour-by [value=block], #colour-by [value=missing]")) setIdle(option, others["map-blocks"]);
 }
+
+export const attachIdle = () => store.subscribe(undefined, showIdle);

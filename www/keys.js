@@ -1,12 +1,12 @@
 /** The keys of the page: one table, from which the overlay with all keys is made. `controls.js` has what those of the picture do. */
 
-import { $ } from "./dom.js";
+import { $, dialog, element, named } from "./dom.js";
 import { openGallery } from "./gallery.js";
+import { redo, share, undo } from "./history.js";
+import { hideMessage } from "./messages.js";
 import { page } from "./page.js";
 import { toggle } from "./parts.js";
 import { fullScreen } from "./picture.js";
-import { share } from "./share.js";
-import { redo, undo } from "./state.js";
 import { showTab } from "./tabs.js";
 import { switchTheme } from "./theme.js";
 
@@ -21,9 +21,9 @@ const VIEWS = ["Surface", "Volume", "Slice", "Solid", "Mesh", "Flow"];
 /** What can be shown beside the view, with Shift and a digit. */
 const BESIDE = ["the surface", "the volume", "the slice", "the boundary", "mesh wires", "the flow", "points"];
 
-/** Chooses a view by its number. */
+/** Chooses a view by its number. @param {number} number */
 function chooseView(number) {
-  const radio = /** @type {HTMLInputElement} */ (document.querySelectorAll("[name=mode]")[number - 1]);
+  const radio = named("mode")[number - 1];
   if (radio && !radio.disabled) radio.click();
 }
 
@@ -58,43 +58,34 @@ const TABLE = {
   ],
 };
 
-function toControl(id) {
+function toControl(/** @type {string} */ id) {
   showTab("settings");
   $(id).focus();
 }
 
 function dismiss() {
-  if (!$("message").hidden) $("message").hidden = true;
+  if (!$("message").hidden) hideMessage();
   else page.probes?.clear();
 }
 
 export function showKeys() {
-  if ($("keys").open) return;
+  if (dialog("keys").open) return;
   $("keys-list").replaceChildren(
     ...Object.entries(TABLE).map(([title, keys]) => {
-      const [section, heading, list] = ["section", "h3", "dl"].map((tag) => document.createElement(tag));
-      heading.textContent = title;
-      list.append(...keys.flatMap(row));
-      section.append(heading, list);
-      return section;
+      const list = element("dl", {}, ...keys.flatMap(row));
+      return element("section", {}, element("h3", {}, title), list);
     }),
   );
-  $("keys").showModal();
+  dialog("keys").showModal();
 }
 
 /** @param {Key} key */
 function row({ keys, what }) {
-  const [term, description] = [document.createElement("dt"), document.createElement("dd")];
-  description.textContent = what;
-  for (const key of keys) {
-    const cap = document.createElement("kbd");
-    cap.textContent = key;
-    term.append(cap, " ");
-  }
-  return [term, description];
+  const caps = keys.flatMap((key) => [element("kbd", {}, key), " "]);
+  return [element("dt", {}, ...caps), element("dd", {}, what)];
 }
 
-/** What the table calls the key of an event. */
+/** What the table calls the key of an event. @param {KeyboardEvent} event */
 function nameOf({ key, code, ctrlKey, metaKey, shiftKey }) {
   const isLetter = /^[a-z]$/i.test(key);
   // With Shift, a digit is another character, which depends on the keyboard.
@@ -104,7 +95,7 @@ function nameOf({ key, code, ctrlKey, metaKey, shiftKey }) {
 }
 
 /** Where letters are text. */
-const isTyping = (target) =>
+const isTyping = (/** @type {EventTarget | null} */ target) =>
   target instanceof HTMLElement && target.matches("select, input:not([type=range], [type=checkbox], [type=radio]), textarea");
 
 const ACTIONS = new Map(

@@ -1,41 +1,67 @@
-/** The demo page: streams a volume, draws it, and makes requests of the settings. `?url=FILE` opens another volume. */
+/**
+ * The demo page: streams a volume, draws it, and makes requests of the settings. `?url=FILE` opens another volume. One file is one
+ * purpose, and none imports in a circle:
+ *
+ * - `store`, `state`, `history`: what is set, in one store; its words; the address, undo and redo, which are made of it
+ * - `page`, `volume`, `source`: what has come of the volume, what it has, where it comes from
+ * - `opening`, `gallery`, `thumbnails`, `files`, `build`, `repair`: opening a volume, from the list or of the user
+ * - `parts`, `planes`, `fields`, `play`, `region`, `request`: controls, and what is asked of the mesh
+ * - `scene`, `colours`, `curve`, `transfer`, `histogram`, `bins`, `flow`, `compare`, `theme`: how it looks
+ * - `camera`, `controls`, `picture`, `keys`, `tabs`: where it is looked from; mouse, touch and keys
+ * - `overlay`, `probes`, `plot`, `empty`, `messages`: what lies over the picture
+ * - `numbers`, `data`, `blockmap`, `idle`: what has arrived; controls that do nothing now
+ * - `export`, `writers`, `compose`: files that are saved
+ * - `dom`, `format`: elements, and numbers as words
+ *
+ * What shows or uses a part of the state subscribes to it; what changes it, a control or the viewer, changes the store alone. So
+ * the address, undo, the controls and the picture cannot disagree.
+ */
 
-import { ColourSettings } from "./colours.js";
-import { Comparison } from "./compare.js";
+import { attachBlockMap } from "./blockmap.js";
+import { attachCamera, lookFrom } from "./camera.js";
+import { attachColours } from "./colours.js";
+import { attachComparison } from "./compare.js";
 import { attachControls } from "./controls.js";
-import { $, announce, attachDialogs } from "./dom.js";
 import { attachData, record } from "./data.js";
+import { $, announce, attachDialogs, svg } from "./dom.js";
 import { attachEmpty } from "./empty.js";
 import { attachExport } from "./export.js";
-import { attachFields, percentilesAtAllTimes } from "./fields.js";
+import { attachFields } from "./fields.js";
 import { attachFiles } from "./files.js";
-import { FlowSettings } from "./flow.js";
+import { addSeed, attachFlow } from "./flow.js";
 import { attachGallery, openGallery, readVolumes, sceneOf, shown, showPoster } from "./gallery.js";
 import { attachHistogram } from "./histogram.js";
+import { attachHistory, hold } from "./history.js";
+import { attachIdle } from "./idle.js";
 import { attachKeys } from "./keys.js";
 import { attachMessages, fail, say } from "./messages.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
-import { isNew, isRemote, onOpened, open, retry, setFirst, showInList } from "./opening.js";
+import { onOpened, open, retry, showInList } from "./opening.js";
 import { OverlayView } from "./overlay.js";
 import { demo, page } from "./page.js";
-import { mode } from "./parts.js";
-import { attachPicture, lookFrom } from "./picture.js";
+import { attachParts, mode } from "./parts.js";
+import { attachPicture } from "./picture.js";
+import { attachPlanes } from "./planes.js";
+import { attachPlay } from "./play.js";
 import { Probes } from "./probes.js";
 import { attachRegion, boxWasDragged, useBox } from "./region.js";
 import { attachRequest } from "./request.js";
-import { seedPlane } from "./planes.js";
-import { attachScene, draw, fractionOf, isovalue, setIsovalue, showLegend } from "./scene.js";
-import { attachShare } from "./share.js";
-import { attachState, hold, read } from "./state.js";
+import { attachScene, draw, showLegend } from "./scene.js";
+import { setFirst } from "./source.js";
+import { attachState, read, store } from "./state.js";
 import { attachTabs } from "./tabs.js";
 import { attachTheme } from "./theme.js";
 import { TransferEditor } from "./transfer.js";
 
-const canvas = $("canvas");
+/** @typedef {Promise<import("./gallery.js").Listed | undefined>} Listed the volume that is shown where no address says another one */
+/** @typedef {import("./controls.js").Point} Point */
+/** @typedef {import("./controls.js").Place} Place */
+
+const canvas = $("canvas", HTMLCanvasElement);
 
 async function start() {
   $("settings").addEventListener("submit", (event) => event.preventDefault());
-  attachMessages({ onRetry: retry, isRemote, isNew });
+  attachMessages(retry);
   attachDialogs();
   attachTabs();
   attachTheme();
@@ -47,7 +73,7 @@ async function start() {
   await painted();
   const viewer = await makeViewer(listed);
   if (!viewer) return;
-  page.viewer = demo.viewer = viewer;
+  demo.viewer = viewer;
   $("gpu").textContent = viewer.adapter && `GPU: ${viewer.adapter}`;
   viewer.addEventListener("progress", ({ detail }) => showProgress(detail));
   viewer.addEventListener("stats", ({ detail }) => showStats(detail));
@@ -63,23 +89,18 @@ async function start() {
     onHover: (point, place) => demo.info && page.probes.hover(point, place),
     onLeave: () => page.probes.leave(),
     onSpan: spanBox,
-    isFlying: () => $("fly").checked,
+    isFlying: () => store.state.fly,
   });
-  attachColours(viewer);
-  page.flow = new FlowSettings({ overlay: page.overlay, onChange: draw });
-  page.comparison = new Comparison(viewer, { onChange: draw, onError: fail });
-  attachScene();
-  attachEmpty();
-  attachFields();
-  attachRequest();
-  attachRegion();
-  attachPicture(viewer, { overlay: page.overlay, onError: fail });
+  page.transfer = new TransferEditor();
+  // Controls first, then what is made of their values: the request and the scene, then what is said of these.
+  for (const attach of [attachState, attachParts, attachPlanes, attachFields, attachPlay, attachFlow, attachComparison, attachHistogram]) attach();
+  for (const attach of [attachCamera, attachRegion, attachRequest, attachScene, attachEmpty, attachIdle, attachPicture]) attach();
+  attachColours(draw);
   attachFiles();
-  attachState(viewer);
-  attachShare();
+  attachHistory();
   attachGallery();
   onOpened(shown);
-  attachHistogram();
+  attachBlockMap();
   attachData();
   attachExport(canvas);
   await begin(listed);
@@ -108,7 +129,7 @@ function wantedUrl() {
   return read(location.hash).url ?? new URLSearchParams(location.search).get("url") ?? undefined;
 }
 
-/** Opens what the address asks for, or the first volume of the list. */
+/** Opens what the address asks for, or the first volume of the list. @param {Listed} listed */
 async function begin(listed) {
   const { url = "", ...words } = read(location.hash);
   const asked = new URLSearchParams(location.search).get("url");
@@ -122,18 +143,18 @@ async function begin(listed) {
   open(url, isPlain ? sceneOf(first) : words);
 }
 
-/** The viewer; nothing where it cannot start, with a message. */
+/** The viewer; nothing where it cannot start, with a message. @param {Listed} listed */
 async function makeViewer(listed) {
   try {
     // Imported here, so that a missing package is reported like other errors.
     const [{ Viewer }, prefetch] = await Promise.all([import("tetralod/viewer"), wantedUrl() ?? listed.then((first) => first?.url)]);
     return await Viewer.create(canvas, prefetch?.startsWith("file:") ? {} : { prefetch });
-  } catch (error) {
+  } catch (/** @type {any} */ error) {
     demo.error = { code: error.code, message: error.message };
     const unsupported = error.code === "no-webgpu";
     demo.state = unsupported ? "unsupported" : "failed";
     $("side-panel").inert = true;
-    for (const id of ["volume", "open-gallery", "reset", "share"]) $(id).disabled = true;
+    for (const id of ["volume", "open-gallery", "reset", "share"]) $(id).toggleAttribute("disabled", true);
     $("loading").hidden = true;
     $("growth").textContent = "";
     say(unsupported ? "This page needs WebGPU" : "The viewer could not start", error);
@@ -141,60 +162,39 @@ async function makeViewer(listed) {
   }
 }
 
-/** What lies over the picture: axes, probes, the plot. */
+/** What lies over the picture: axes, probes, the plot. @param {import("tetralod/viewer").Viewer} viewer */
 function attachOverlay(viewer) {
-  const covered = ["legend", "growth"].map($);
-  const overlay = new OverlayView($("overlay"), { covered, onSide: (side) => lookFrom(viewer, side).catch(fail) });
-  viewer.addEventListener("overlay", ({ detail }) => (overlay.data = detail));
-  const parts = { readout: $("readout"), cards: $("cards"), marquee: $("marquee") };
-  const plot = { plot: $("plot"), plotTitle: $("plot-title"), plotArea: $("plot-area") };
-  const stage = { ...parts, ...plot };
-  const svg = $("overlay");
-  const probes = new Probes({ viewer, overlay, svg, stage, fields: () => demo.info?.fields, shown: () => page.field });
-  Object.assign(page, { overlay, probes });
-  $("unpin").addEventListener("click", () => probes.clear());
+  const covered = ["legend", "growth"].map((id) => $(id));
+  page.overlay = new OverlayView(svg("overlay"), { covered, onSide: lookFrom });
+  page.probes = new Probes();
+  viewer.addEventListener("overlay", ({ detail }) => (page.overlay.data = detail));
+  store.subscribe(["axes"], () => (page.overlay.showsAxes = store.state.axes));
+  $("unpin").addEventListener("click", () => page.probes.clear());
   $("box-of-pins").addEventListener("click", () => {
-    const [one, other] = probes.pins;
-    if (other) useBox(probes.boxOf(one.position, other.position));
+    const [one, other] = page.probes.pins;
+    if (other) useBox(page.probes.boxOf(one.position, other.position));
   });
 }
 
-/** The colours of values, and the transfer function. */
-function attachColours(viewer) {
-  const parts = { map: $("map"), reversed: $("reversed"), log: $("log"), preset: $("range-preset") };
-  const range = { low: $("range-low"), high: $("range-high"), note: $("range-note") };
-  const percentiles = async (fractions) =>
-    percentilesAtAllTimes(fractions) ?? Array.from((await viewer.stats({ bins: 1000, fractions })).percentiles);
-  page.colours = new ColourSettings({ ...parts, ...range }, { percentiles, onChange: draw });
-  const ends = { low: $("transfer-low"), high: $("transfer-high"), chosen: $("transfer-chosen"), bar: $("transfer-bar") };
-  const buttons = { preset: $("transfer-preset"), add: $("transfer-add"), remove: $("transfer-remove") };
-  page.transfer = new TransferEditor(
-    { svg: $("transfer"), ...ends, ...buttons },
-    { isovalue: () => (page.field ? fractionOf(isovalue()) : 0.5), onIsovalue: setIsovalue, onChange: draw },
-  );
-}
-
-/** A click on the picture, or its key: a seed of a streamline on the plane in the view of the flow, a probe in all others. */
+/** A click on the picture, or its key: a seed of a streamline on the plane in the view of the flow, a probe in all others. @param {Point} point */
 async function clicked(point) {
   if (!demo.info) return;
   try {
-    announce(await (mode() === "flow" ? addSeed(point) : addProbe(point)), 0);
+    announce(mode() === "flow" ? seed(point) : ((await page.probes.pin(point)) ?? "Nothing is shown there"), 0);
   } catch (error) {
     fail(error);
   }
 }
 
-const addSeed = (point) => (page.flow.click(point, seedPlane()) ? "One more seed on the plane" : "The plane of the seeds is not there");
-
-const addProbe = async (point) => ((await page.probes.pin(point)) ? page.probes.spoken : "Nothing is shown there");
+const seed = (/** @type {Point} */ point) => (addSeed(point) ? "One more seed on the plane" : "The plane of the seeds is not there");
 
 /** Where the rectangle that is being spanned ends. */
 let spanEnd = { x: 0, y: 0 };
 
-/** A rectangle is being spanned on the picture, or has been: makes a box of what is seen at its ends. */
+/** A rectangle is being spanned on the picture, or has been: makes a box of what is seen at its ends. @type {import("./controls.js").Actions["onSpan"]} */
 async function spanBox(from, to, points) {
   const { probes } = page;
-  if (from) spanEnd = to;
+  if (to) spanEnd = to;
   probes.marquee(from, to);
   if (!points) return;
   const spanned = await probes.boxBetween(...points);

@@ -1,8 +1,10 @@
-/** Messages over the picture: errors, and what to do. */
+/** Messages over the picture: errors, what to do, and notes. */
 
-import { $ } from "./dom.js";
+import { $, element, input } from "./dom.js";
 import { demo } from "./page.js";
+import { isNew, isRemote } from "./source.js";
 
+/** @type {Record<string, string>} */
 const TITLES = {
   "no-file": "This file is not part of the link",
   network: "The file could not be downloaded",
@@ -19,19 +21,19 @@ const PASSING = ["network", "server", "changed", "truncated", "timeout"];
 /** Answers to a wrong address, or to a file that is not for this page: they will be the same. */
 const LASTING = /HTTP 4(?!08|25|29)\d\d/;
 
-/** Shows what went wrong. What has arrived stays usable. */
+/** Shows what went wrong. What has arrived stays usable. @param {any} error */
 export function fail(error) {
   demo.error = { code: error.code, message: error.message };
   demo.state = "failed";
   $("loading").classList.add("done");
-  $("retry").hidden = !(PASSING.includes(error.code) && isElsewhere() && !(LASTING.test(error.message) && isOpening()));
+  $("retry").hidden = !(PASSING.includes(error.code) && isRemote() && !(LASTING.test(error.message) && isNew()));
   $("choose-file").hidden = error.code !== "no-file";
   // Nothing has come yet: what was said of the opening is over.
   if (!demo.info) $("growth").textContent = "";
   say(TITLES[error.code] ?? "The file could not be opened", error);
 }
 
-/** Shows a message. It can be closed, and keeps out of the way of what is drawn. */
+/** Shows a message. It can be closed, and keeps out of the way of what is drawn. @param {string} title @param {any} error */
 export function say(title, error) {
   $("message-title").textContent = title;
   const words = error.message ?? String(error);
@@ -42,20 +44,46 @@ export function say(title, error) {
   $("message").hidden = false;
 }
 
-/** Whether what is opened comes from a server: a file of the user would fail again. */
-let isElsewhere = () => true;
-/** Whether nothing has come of it: a server that has sent a part of a file has it. */
-let isOpening = () => true;
-
-/** @param {{ onRetry: () => void, isRemote: () => boolean, isNew: () => boolean }} page */
-export function attachMessages({ onRetry, isRemote, isNew }) {
-  isElsewhere = isRemote;
-  isOpening = isNew;
-  $("dismiss").addEventListener("click", hideMessage);
-  $("choose-file").addEventListener("click", () => $("file").click());
-  $("retry").addEventListener("click", onRetry);
-}
-
 export function hideMessage() {
   $("message").hidden = true;
+}
+
+/** How long a note stays (in ms); longer ones stay longer. */
+const NOTE = 4000;
+const A_LETTER = 100;
+
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let timer;
+
+/**
+ * Shows words for a while; with something to do, until it is done or another note comes. Screen readers announce them.
+ *
+ * @param {string} words
+ * @param {{ label: string, act: () => void }} [action]
+ */
+export function note(words, action) {
+  clearTimeout(timer);
+  const hide = () => ($("note").hidden = true);
+  $("note").replaceChildren(words);
+  $("note").hidden = false;
+  if (!action) {
+    timer = setTimeout(hide, Math.max(NOTE, A_LETTER * words.length));
+    return;
+  }
+  const close = { label: "Close", act: () => {} };
+  for (const { label, act } of [action, close]) {
+    const button = element("button", { type: "button", textContent: label });
+    button.addEventListener("click", () => {
+      hide();
+      act();
+    });
+    $("note").append(" ", button);
+  }
+}
+
+/** @param {() => void} onRetry */
+export function attachMessages(onRetry) {
+  $("dismiss").addEventListener("click", hideMessage);
+  $("choose-file").addEventListener("click", () => input("file").click());
+  $("retry").addEventListener("click", onRetry);
 }

@@ -1,13 +1,13 @@
 /** The numbers of the page: what has arrived, how good the mesh is, and what a picture takes. */
 
-import { $, all, announce } from "./dom.js";
+import { $, all, announce, element } from "./dom.js";
 import { noteEmpty, showEmpty } from "./empty.js";
 import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./format.js";
+import { showHistogram } from "./histogram.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
-import { originOf } from "./opening.js";
 import { budget, errorPixels } from "./request.js";
-import { showHistogram } from "./scene.js";
+import { originOf } from "./source.js";
 
 /** @param {import("tetralod/viewer").ViewerProgress} progress */
 export function showProgress({ bytes, total, complete, blocks }) {
@@ -17,7 +17,7 @@ export function showProgress({ bytes, total, complete, blocks }) {
   if (blocks) return showBlocks(blocks, bytes);
   const known = total ?? demo.totalBytes;
   demo.totalBytes ??= total;
-  if (known) $("progress").value = bytes / known;
+  if (known) $("progress", HTMLProgressElement).value = bytes / known;
   const amount = known ? `${size(bytes)} of ${size(known)}` : size(bytes);
   showGrowth();
   $("n-bytes").textContent = complete ? size(bytes) : amount;
@@ -29,23 +29,23 @@ export function showGrowth() {
   if (!info) return;
   const { vertices, tetrahedra } = info;
   const whole = totalBytes ? `, ${size(totalBytes)} as MT` : "";
-  const arrived = document.createElement("b");
-  arrived.textContent = size(receivedBytes);
+  const arrived = element("b", {}, size(receivedBytes));
   const origin = originOf();
   const before = origin ? `${size(origin.bytes)} as ${origin.format}` : `${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU`;
   const words = `${count(tetrahedra)} tetrahedra: ${before}${whole}, `;
   $("growth").replaceChildren(words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched");
 }
 
-/** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. */
+/** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. @param {import("tetralod").BlockProgress} blocks @param {number} bytes */
 function showBlocks({ here, all, needed, leftOut }, bytes) {
-  if (needed > 0) $("progress").value = Math.min(here / needed, 1);
+  if (needed > 0) $("progress", HTMLProgressElement).value = Math.min(here / needed, 1);
   showGrowth();
   const excess = leftOut > 0 ? `, ${count(leftOut)} do not fit in memory` : "";
   $("n-blocks").textContent = `${count(here)} of ${count(all)}${excess}`;
   $("n-bytes").textContent = size(bytes);
 }
 
+/** @param {import("./page.js").Stats} stats */
 export function showStats(stats) {
   demo.step = stats;
   showEmpty();
@@ -78,12 +78,13 @@ export function showStats(stats) {
 }
 
 /** What keeps the mesh from being finer. */
-function limit({ satisfied, missing }) {
-  if (demo.blocks?.leftOut > 0) return "Limited by memory";
+function limit(/** @type {import("./page.js").Stats} */ { satisfied, missing }) {
+  if ((demo.blocks?.leftOut ?? 0) > 0) return "Limited by memory";
   if (missing) return "Limited by the network: data is on its way";
   return satisfied ? "Limited by the error" : "Limited by this number";
 }
 
+/** @param {import("tetralod/viewer").ViewerFrame} frame */
 export function showFrame(frame) {
   noteEmpty(frame);
   demo.frame = frame;
@@ -103,7 +104,7 @@ export function showFrame(frame) {
 const BUDGET_NOTE = "If the mesh would be larger, its error is as small as this number allows";
 
 /** The errors that the budget allows. */
-function achieved({ relativeErrorBound, bounds }) {
+function achieved(/** @type {import("./page.js").Stats} */ { relativeErrorBound, bounds }) {
   const seen = bounds[1] === undefined ? "" : ` and ${pixels(bounds[1])} on screen`;
   return `Too few for the requested error: the error is at most ${percentage(relativeErrorBound * 100)}${seen}`;
 }

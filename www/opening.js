@@ -1,14 +1,19 @@
 /** Opening a volume, and following its download. */
 
-import { $ } from "./dom.js";
-import { setFields } from "./fields.js";
+import { cameraIsNew } from "./camera.js";
+import { $, select } from "./dom.js";
+import { listFields } from "./fields.js";
 import { nameOf } from "./format.js";
-import { fail, hideMessage } from "./messages.js";
+import { fail, hideMessage, note } from "./messages.js";
 import { showGrowth } from "./numbers.js";
-import { demo, page } from "./page.js";
-import { arriveWith, carriedOver } from "./state.js";
+import { demo, viewer } from "./page.js";
+import { fileNameIn, isNew, openSource, setOrigin, setSource, setTried, sourceOf, triedSource } from "./source.js";
+import { carriedOver, showFitting, store } from "./state.js";
 
-/** The kinds of MT, with their updates. */
+/** @typedef {import("./source.js").Source} Source */
+/** @typedef {import("./state.js").Words} Words */
+
+/** The kinds of MT, with their updates. @type {Record<string, string>} */
 const KINDS = {
   "half-edge": "half-edge (vertex insertions)",
   edge: "edge (vertex splits)",
@@ -16,88 +21,48 @@ const KINDS = {
   explicit: "explicit (any updates)",
 };
 
-/** What is open. @type {string | File} */
-let source;
-/** What was opened last, perhaps in vain: the button "Try again" opens it again. @type {string | File} */
-let tried;
 let opening = 0;
-/** What the page opens by itself. */
-let first = "";
-/** Files of the user, by their names: undo may come back to them. @type {Map<string, File>} */
-const files = new Map();
-/** The file that a link is of, which contains none: until it is dropped, and how it is shown then. @type {{ name: string, words?: Record<string, string> } | undefined} */
+/** The file that a link is of, which contains none: until it is dropped, and how it is shown then. @type {{ name: string, words?: Words } | undefined} */
 let awaited;
-const FILE = "file:";
+/** What is told when a volume is complete. @type {(from: Source) => unknown} */
+let opened = () => {};
 
-/** What MT files were built of by the page: in words, and its bytes. @type {WeakMap<File, { format: string, bytes: number }>} */
-const origins = new WeakMap();
+/** @param {typeof opened} then is called when a volume is complete */
+export const onOpened = (then) => void (opened = then);
 
 /** Opens an MT file that the page has built of files of the user. @param {File} built @param {File[]} files */
 export function openBuilt(built, files) {
-  const [data] = files.filter(({ name }) => !/\.json$/i.test(name));
-  const format = (data ?? files[0]).name.split(".").pop().toUpperCase();
-  origins.set(built, { format, bytes: files.reduce((sum, { size }) => sum + size, 0) });
+  setOrigin(built, files);
   return open(built);
-}
-
-/** What the volume was built of, if the page has built it. */
-export const originOf = () => (source instanceof File ? origins.get(source) : undefined);
-
-/** The name of the volume, for files that are made of it. */
-export const volumeName = () => (source ? nameOf(source).replace(/\.mt$/i, "") : "tetralod");
-
-/** Says what is open where no address says anything else. @param {string} url */
-export function setFirst(url) {
-  first = url;
-}
-
-/** Whether what was opened last comes from a server. */
-export const isRemote = () => !(tried instanceof File);
-
-/** Whether nothing has come of what was opened last. */
-export const isNew = () => tried !== source || !demo.info;
-
-/** What is open, as in the address of the page. */
-export function sourceWords() {
-  if (source instanceof File) return `${FILE}${source.name}`;
-  return source === first ? "" : source;
-}
-
-/** The volume that words of an address mean; undefined for a file that is not here. */
-function sourceOf(words) {
-  if (words === "") return first;
-  return words.startsWith(FILE) ? files.get(words.slice(FILE.length)) : words;
 }
 
 /**
  * Opens a volume: a URL, a file of the user, or what the words of an address mean. Shows it with the state `words`; without
  * them the settings stay, as far as they have a meaning there.
  *
- * @param {string | File} wanted
- * @param {Record<string, string>} [words]
+ * @param {Source} wanted
+ * @param {Words} [words]
  */
 export async function open(wanted, words) {
-  if (wanted instanceof File) files.set(wanted.name, wanted);
-  const from = typeof wanted === "string" ? sourceOf(wanted) : wanted;
-  if (!from) return wait({ name: wanted.slice(FILE.length), words });
-  const before = { ...demo, source };
+  const from = sourceOf(wanted);
+  if (!from) return wait({ name: fileNameIn(String(wanted)) ?? "", words });
+  const before = { ...demo, source: openSource() };
   const ofLink = from instanceof File && from.name === awaited?.name ? awaited.words : undefined;
   awaited = undefined;
   const shown = words ?? ofLink ?? (demo.info ? carriedOver() : {});
-  source = tried = from;
+  setTried(from);
   showInList(from);
   const mine = ++opening;
-  Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
+  Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined, request: undefined, blocks: undefined });
   Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
-  demo.blocks = undefined;
-  page.comparison.forget();
+  store.change({ playing: false, freeze: false, kept: false });
   hideMessage();
   $("legend").hidden = true;
   $("loading").classList.remove("done");
   $("progress").removeAttribute("value");
   $("growth").textContent = `Opening ${nameOf(from)}…`;
   try {
-    const { info, total, finished } = await page.viewer.open(from);
+    const { info, total, finished } = await viewer().open(from);
     if (mine !== opening) return;
     demo.totalBytes = total;
     if (demo.state === "opening") demo.state = "streaming";
@@ -110,67 +75,69 @@ export async function open(wanted, words) {
     $("loading").classList.add("done");
     opened(from);
   } catch (error) {
-    if (mine !== opening || error?.name === "AbortError") return;
+    if (mine !== opening || (error instanceof Error && error.name === "AbortError")) return;
     stay(before);
     fail(error);
   }
 }
 
-/** A link is of a file that is not here: says so, and shows it as in the link when it is dropped. */
+/** A link is of a file that is not here: says so, and shows it as in the link when it is dropped. @param {NonNullable<typeof awaited>} file */
 function wait(file) {
   awaited = file;
-  if (!demo.info) showInList(/** @type {any} */ ({ name: file.name }));
-  const words = `The link is of ${file.name}, a file on a disk, which links do not contain. Drop it on the page, or choose it, to see it as in the link`;
-  fail({ code: "no-file", message: words });
+  if (!demo.info) showInList(file);
+  const message = `The link is of ${file.name}, a file on a disk, which links do not contain. Drop it on the page, or choose it, to see it as in the link`;
+  fail({ code: "no-file", message });
 }
 
-/** What could not be opened has not taken the place of the volume before: that stays, with its settings. */
-function stay({ source: from, ...before }) {
-  if (!before.info || page.viewer.info !== before.info) return;
-  source = from;
+/** What could not be opened has not taken the place of the volume before: that stays, with its settings. @param {typeof demo & { source?: Source }} before */
+function stay({ source, ...before }) {
+  if (!source || !before.info || viewer().info !== before.info) return;
+  setSource(source);
   Object.assign(demo, { ...before, frames: demo.frames });
-  showInList(from);
+  // What was set meanwhile is of it.
+  store.replace({});
+  showInList(source);
   showGrowth();
-  $("legend").hidden = !page.viewer.legend;
-}
-
-/** What is told when a volume has been opened. @type {(from: string | File) => unknown} */
-let opened = () => {};
-
-/** Calls `then` when a volume is complete. @param {typeof opened} then */
-export function onOpened(then) {
-  opened = then;
+  $("legend").hidden = !viewer().legend;
 }
 
 /** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
 export async function retry() {
-  if (isNew() || !demo.blocks || demo.error?.code === "changed") return open(tried);
+  if (isNew() || !demo.blocks || demo.error?.code === "changed") return open(triedSource() ?? "");
   hideMessage();
   demo.error = undefined;
   demo.state = "streaming";
   const mine = opening;
+  const isStreaming = () => mine === opening && demo.state === "streaming";
   try {
-    await page.viewer.retry();
-    await page.viewer.settled();
-    if (mine === opening && demo.state === "streaming") demo.state = "complete";
+    await viewer().retry();
+    await viewer().settled();
+    if (isStreaming()) demo.state = "complete";
   } catch (error) {
-    if (mine === opening && demo.state === "streaming") fail(error);
+    if (isStreaming()) fail(error);
   }
 }
 
-/** The base mesh has arrived: sets up the settings for it. */
+/** The base mesh has arrived: sets up the settings for it. @param {import("tetralod").MtInfo} info @param {Words} words */
 function arrive(info, words) {
   demo.info = info;
-  page.probes.clear();
-  page.flow.fields = info.fields;
   $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
-  setFields(info.fields);
-  arriveWith(words);
+  listFields();
+  cameraIsNew();
+  const { lost, ignored } = showFitting(words);
+  tell(lost, ignored);
 }
 
-/** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. */
+/** Says what the volume does not have, and what means nothing. @param {string[]} lost @param {string[]} ignored */
+export function tell(lost, ignored) {
+  const said = lost.length > 0 ? [`Left out, since this volume does not have it: ${lost.join(", ")}`] : [];
+  if (ignored.length > 0) said.push(`Ignored in the address, for it means nothing: ${ignored.join(", ")}`);
+  if (said.length > 0) note(said.join(". "));
+}
+
+/** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. @param {string | { name: string }} from */
 export function showInList(from) {
-  const list = $("volume");
+  const list = select("volume");
   const listed = [...list.options].find(({ value }) => value && value === from);
   if (listed) {
     listed.selected = true;

@@ -6,7 +6,7 @@
  * picture are left out.
  */
 
-const SVG = "http://www.w3.org/2000/svg";
+import { shape } from "./dom.js";
 
 /** Widths of characters and heights of lines of labels, in pixels. */
 const LABEL = { width: 7, height: 15 };
@@ -33,25 +33,23 @@ const FACES = NAMES.flatMap((name, axis) =>
 
 /** @typedef {{ left: number, top: number, right: number, bottom: number }} Box */
 /** @typedef {ArrayLike<number> & Iterable<number>} Coordinates */
+/** @typedef {{ axis: number, at: number, bounds: ArrayLike<number>, seeds: readonly Coordinates[] }} Quad */
+/** @typedef {{ center: number[], radius: number }} Sphere */
+/** @typedef {[x: number, y: number]} Pixels */
 
-/** @type {(name: string, attributes?: Record<string, any>, text?: string) => SVGElement} */
-export function element(name, attributes = {}, text = undefined) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
-  if (text !== undefined) made.textContent = text;
-  return made;
-}
+/** @template T @param {T | undefined} one @returns {one is T} */
+const isThere = (one) => one !== undefined;
 
 export class OverlayView {
   #svg;
-  #moving = element("g");
+  #moving = shape("g");
   #faces;
   /** @type {import("tetralod/viewer").Overlay | undefined} */
   #data;
   #showsAxes = true;
-  /** @type {{ axis: number, at: number, bounds: number[], seeds: number[][] } | undefined} */
+  /** @type {Quad | undefined} */
   #quad;
-  /** @type {{ center: number[], radius: number } | undefined} */
+  /** @type {Sphere | undefined} */
   #sphere;
   /** What lies over the picture, and must stay free of labels: elements of the page. @type {HTMLElement[]} */
   #covered;
@@ -66,8 +64,8 @@ export class OverlayView {
     this.#svg = svg;
     this.#covered = covered;
     this.#faces = FACES.map((face) => {
-      const group = element("g", { class: `face face-${NAMES[face.axis]}` });
-      group.append(element("polygon"), element("text", {}, face.label), element("title", {}, `Look at ${face.label}`));
+      const group = shape("g", { class: `face face-${NAMES[face.axis]}` });
+      group.append(shape("polygon"), shape("text", {}, face.label), shape("title", {}, `Look at ${face.label}`));
       group.addEventListener("click", () => onSide(face.side));
       return { ...face, group };
     });
@@ -75,7 +73,7 @@ export class OverlayView {
     new ResizeObserver(() => this.#draw()).observe(svg);
   }
 
-  /** What the viewer says with its event `overlay`. */
+  /** What the viewer says with its event `overlay`. @param {import("tetralod/viewer").Overlay | undefined} data */
   set data(data) {
     this.#data = data;
     this.#draw();
@@ -86,18 +84,19 @@ export class OverlayView {
     return this.#data?.rotation;
   }
 
+  /** @param {boolean} shows */
   set showsAxes(shows) {
     this.#showsAxes = shows;
     this.#draw();
   }
 
-  /** A plane across the box, and points on it; undefined for none. */
+  /** A plane across the box, and points on it; undefined for none. @param {Quad | undefined} quad */
   set quad(quad) {
     this.#quad = quad;
     this.#draw();
   }
 
-  /** A sphere, drawn as three circles; undefined for none. */
+  /** A sphere, drawn as three circles; undefined for none. @param {Sphere | undefined} sphere */
   set sphere(sphere) {
     this.#sphere = sphere;
     this.#draw();
@@ -106,6 +105,9 @@ export class OverlayView {
   /**
    * The point of the plane of an axis at a coordinate that is seen at a point of the canvas; undefined if that is not in the box.
    *
+   * @param {[number, number]} point
+   * @param {number} axis
+   * @param {number} at
    * @returns {[number, number, number] | undefined}
    */
   onPlane([x, y], axis, at) {
@@ -113,8 +115,8 @@ export class OverlayView {
     if (!m || !bounds) return undefined;
     const [first, second] = [(axis + 1) % 3, (axis + 2) % 3];
     // Two linear equations for the two other coordinates.
-    const equation = (i, screen) => {
-      const part = (column) => m[4 * column + i] - screen * m[4 * column + 3];
+    const equation = (/** @type {number} */ i, /** @type {number} */ screen) => {
+      const part = (/** @type {number} */ column) => m[4 * column + i] - screen * m[4 * column + 3];
       return [part(first), part(second), -(part(axis) * at + part(3))];
     };
     const [[a, b, e], [c, d, f]] = [equation(0, x), equation(1, y)];
@@ -128,25 +130,23 @@ export class OverlayView {
 
   /** The outline of the plane, and the points on it. */
   #plane() {
-    const group = element("g", { class: "plane" });
+    const group = shape("g", { class: "plane" });
     if (!this.#quad) return group;
     const { axis, at, bounds, seeds } = this.#quad;
-    const corner = (one, other) => {
+    const corner = (/** @type {number} */ one, /** @type {number} */ other) => {
       const p = [0, 0, 0];
       [p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]] = [at, bounds[((axis + 1) % 3) + 3 * one], bounds[((axis + 2) % 3) + 3 * other]];
       return this.project(p);
     };
     const corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
-    if (corners.every(Boolean)) group.append(element("polygon", { points: corners.map((p) => p.join()).join(" ") }));
-    for (const place of seeds.map((seed) => this.project(seed)).filter(Boolean)) {
-      group.append(element("circle", { cx: place[0], cy: place[1], r: 3.5 }));
-    }
+    if (corners.every(isThere)) group.append(shape("polygon", { points: corners.join(" ") }));
+    for (const [cx, cy] of seeds.map((seed) => this.project(seed)).filter(isThere)) group.append(shape("circle", { cx, cy, r: 3.5 }));
     return group;
   }
 
   /** Circles around the sphere, across each axis. */
   #circles() {
-    const group = element("g", { class: "sphere" });
+    const group = shape("g", { class: "sphere" });
     if (!this.#sphere) return group;
     const { center, radius } = this.#sphere;
     for (const axis of [0, 1, 2]) {
@@ -156,7 +156,7 @@ export class OverlayView {
         point[(axis + 2) % 3] += radius * Math.sin((2 * Math.PI * i) / CIRCLE);
         return this.project(point);
       });
-      if (points.every(Boolean)) group.append(element("polyline", { points: points.map((p) => p.join()).join(" ") }));
+      if (points.every(isThere)) group.append(shape("polyline", { points: points.join(" ") }));
     }
     return group;
   }
@@ -166,22 +166,22 @@ export class OverlayView {
     this.#draw();
   }
 
-  /** Calls `then` whenever places on the screen have changed. */
+  /** Calls `then` whenever places on the screen have changed. @param {() => void} then */
   follow(then) {
     this.#followers.push(then);
   }
 
-  /** Where a point of the model is on the screen, in pixels; undefined behind the eye. @param {Coordinates} point */
+  /** Where a point of the model is on the screen, in pixels; undefined behind the eye. @param {Coordinates} point @returns {Pixels | undefined} */
   project(point) {
     const [x, y, z] = point;
     const m = this.#data?.matrix;
     if (!m) return undefined;
-    const row = (i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i];
+    const row = (/** @type {number} */ i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i];
     const w = row(3);
     return w > 0 ? this.#pixels([row(0) / w, row(1) / w]) : undefined;
   }
 
-  /** A point of the canvas (−1 to 1, y upwards) in pixels. @param {Coordinates} point */
+  /** A point of the canvas (−1 to 1, y upwards) in pixels. @param {Coordinates} point @returns {Pixels} */
   #pixels(point) {
     const [x, y] = point;
     const { clientWidth, clientHeight } = this.#svg;
@@ -197,9 +197,9 @@ export class OverlayView {
     /** @type {Box[]} */
     const taken = this.#takenBoxes();
     if (hasCube) taken.push({ left: right - 2 * CUBE.right, top: 0, right, bottom: 2 * CUBE.top });
-    const fits = (box) => box.left > 2 && box.top > 2 && box.right < right - 2 && box.bottom < bottom - 2;
-    const isFree = (box) => fits(box) && !taken.some((other) => overlap(box, other));
-    const place = (box) => isFree(box) && taken.push(box) > 0;
+    const fits = (/** @type {Box} */ box) => box.left > 2 && box.top > 2 && box.right < right - 2 && box.bottom < bottom - 2;
+    const isFree = (/** @type {Box} */ box) => fits(box) && !taken.some((other) => overlap(box, other));
+    const place = (/** @type {Box} */ box) => isFree(box) && taken.push(box) > 0;
     /** @type {SVGElement[]} */
     const parts = [this.#plane(), this.#circles()];
     if (this.#showsAxes) {
@@ -232,9 +232,11 @@ export class OverlayView {
 
   /** @param {import("tetralod/viewer").AxisOverlay} axis @param {(box: Box) => boolean} place */
   #axis({ axis, ends, outward, ticks }, place) {
-    const group = element("g", { class: `axis axis-${NAMES[axis]}` });
+    const group = shape("g", { class: `axis axis-${NAMES[axis]}` });
     const [from, to] = ends.map((end) => this.#pixels(end));
+    /** @type {Pixels} */
     const out = [outward[0], -outward[1]];
+    /** @param {Pixels} from @param {number} distance @returns {Pixels} */
     const away = (from, distance) => [from[0] + out[0] * distance, from[1] + out[1] * distance];
     group.append(line(from, to));
     let farthest = 0;
@@ -249,15 +251,14 @@ export class OverlayView {
     }
     // The name is at the middle, or where there is room for it.
     const places = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9, 0, 1].map((part) => {
-      const point = [0, 1].map((i) => from[i] + (to[i] - from[i]) * part);
-      return labelBox(away(point, GAP + farthest + 5), out, NAMES[axis]);
+      return labelBox(away([from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part], GAP + farthest + 5), out, NAMES[axis]);
     });
     const free = places.find(place);
     if (free) group.append(text(free, NAMES[axis], "name"));
     return group;
   }
 
-  /** The scale bar at the bottom left, above the legend. */
+  /** The scale bar at the bottom left, above the legend. @param {import("tetralod/viewer").Overlay["scaleBar"]} bar @param {Box[]} taken @param {number} bottom */
   #scaleBar({ label, width, everywhere }, taken, bottom) {
     const length = width * this.#svg.clientWidth;
     const words = everywhere ? label : `${label} at the target`;
@@ -265,24 +266,25 @@ export class OverlayView {
     const legend = taken.find((box) => box.left < 60 && box.bottom > bottom - 60);
     const left = 26;
     const base = legend ? legend.top - 14 : bottom - 24;
-    const bar = element("path", { d: `M${left} ${base - 6}v6h${length}v-6`, class: "bar" });
-    const group = element("g", { class: "scale-bar" });
+    const bar = shape("path", { d: `M${left} ${base - 6}v6h${length}v-6`, class: "bar" });
+    const group = shape("g", { class: "scale-bar" });
     const box = { left: left - 8, top: base - 27, right: left + wide + 8, bottom: base + 8 };
     const size = { width: box.right - box.left, height: box.bottom - box.top };
-    group.append(element("rect", { x: box.left, y: box.top, rx: 6, ...size }));
-    group.append(bar, element("text", { x: left, y: base - 11 }, words));
+    group.append(shape("rect", { x: box.left, y: box.top, rx: 6, ...size }));
+    group.append(bar, shape("text", { x: left, y: base - 11 }, words));
     taken.push(box);
     return group;
   }
 
+  /** @param {number[][]} rotation @param {number} width @param {boolean} isShown */
   #turnCube([rightward, upward, towards], width, isShown) {
-    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     const centre = [width - CUBE.right, CUBE.top];
-    const place = (p) => [centre[0] + CUBE.size * dot(rightward, p), centre[1] - CUBE.size * dot(upward, p)];
+    const place = (/** @type {number[]} */ p) => [centre[0] + CUBE.size * dot(rightward, p), centre[1] - CUBE.size * dot(upward, p)];
     for (const { axis, sign, group } of this.#faces) {
       const facing = sign * towards[axis];
       group.toggleAttribute("hidden", !isShown || facing < 0.02);
-      const at = (first, second) => {
+      const at = (/** @type {number} */ first, /** @type {number} */ second) => {
         const p = [0, 0, 0];
         [p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]] = [sign, first, second];
         return place(p);
@@ -291,18 +293,19 @@ export class OverlayView {
       const [polygon, label] = group.children;
       polygon.setAttribute("points", corners.map((corner) => corner.join()).join(" "));
       const [x, y] = at(0, 0);
-      label.setAttribute("x", x);
+      label.setAttribute("x", String(x));
       label.setAttribute("y", String(y + 4));
       label.toggleAttribute("hidden", facing < 0.35);
     }
   }
 }
 
+/** @param {Pixels} from @param {Pixels} to */
 function line(from, to) {
-  return element("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1] });
+  return shape("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1] });
 }
 
-/** The box of a label whose nearest point to the axis is `at`, in the direction `out` from it. @returns {Box} */
+/** The box of a label whose nearest point to the axis is `at`, in the direction `out` from it. @param {Pixels} at @param {Pixels} out @param {string} words @returns {Box} */
 function labelBox(at, out, words) {
   const [[x, y], [outX, outY]] = [at, out];
   const [width, height] = [words.length * LABEL.width, LABEL.height];
@@ -311,10 +314,12 @@ function labelBox(at, out, words) {
   return { left, top, right: left + width, bottom: top + height };
 }
 
+/** @param {Box} box @param {string} words */
 function text({ left, right, bottom }, words, kind = "label") {
-  return element("text", { x: (left + right) / 2, y: bottom - 3.5, class: kind }, words);
+  return shape("text", { x: (left + right) / 2, y: bottom - 3.5, class: kind }, words);
 }
 
+/** @param {Box} a @param {Box} b */
 function overlap(a, b) {
   return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 }

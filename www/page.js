@@ -1,50 +1,48 @@
 /**
- * What the parts of the page share. Tests read the state of the page from `window.tetralodDemo`: `state` is "starting",
- * "opening", "streaming", "complete", "failed" or "unsupported".
+ * What has come of the volume, and the viewer. Tests read it from `window.tetralodDemo`: `state` is "starting", "opening",
+ * "streaming", "complete", "failed" or "unsupported".
  */
 
-export const demo = (window.tetralodDemo = {
-  state: "starting",
-  /** @type {import("tetralod/viewer").Viewer | undefined} */
-  viewer: undefined,
-  /** @type {import("tetralod").MtInfo | undefined} */
-  info: undefined,
-  /** Statistics of the last complete mesh (all its data has arrived), and of the last step of refinement. */
-  stats: undefined,
-  step: undefined,
-  /** The last request. */
-  request: undefined,
-  frame: undefined,
-  frames: 0,
-  error: undefined,
-  /** At the first picture that shows the dataset: bytes decoded and milliseconds since the page was opened. */
-  firstFrameBytes: undefined,
-  firstFrameMs: undefined,
-  receivedBytes: 0,
-  totalBytes: undefined,
-  /** Of a file that is fetched in blocks: numbers of its blocks. */
-  blocks: undefined,
-});
+/** @typedef {import("tetralod/viewer").ViewerStats} Stats */
 
 /**
- * A field at one of its times. `min` and `max` are over all times, and the histogram is of that range, so that values and colours mean
- * the same at all of them; `number` is its place in `info.fields`, `own` what that says of it.
+ * @typedef {object} Demo
+ * @property {"starting" | "opening" | "streaming" | "complete" | "failed" | "unsupported"} state
+ * @property {import("tetralod/viewer").Viewer} [viewer]
+ * @property {import("tetralod").MtInfo} [info]
+ * @property {Stats} [stats] of the last complete mesh: all its data has arrived
+ * @property {Stats} [step] of the last step of refinement
+ * @property {import("tetralod/viewer").ViewerRefineOptions} [request] the last one
+ * @property {import("tetralod/viewer").ViewerFrame} [frame]
+ * @property {number} frames
+ * @property {{ code?: string, message: string }} [error]
+ * @property {number} [firstFrameBytes] decoded at the first picture that shows the volume
+ * @property {number} [firstFrameMs] from when the page was opened to that picture
+ * @property {number} receivedBytes
+ * @property {number} [totalBytes]
+ * @property {import("tetralod").BlockProgress} [blocks] of a file that is fetched in blocks
+ */
+
+/** @type {Demo} */
+export const demo = { state: "starting", frames: 0, receivedBytes: 0 };
+window.tetralodDemo = demo;
+
+/** The volume that is open. Only asked for while there is one. */
+export function volume() {
+  if (!demo.info) throw new Error("No volume is open");
+  return demo.info;
+}
+
+/** The viewer. Only asked for when it has started. */
+export function viewer() {
+  if (!demo.viewer) throw new Error("The viewer has not started");
+  return demo.viewer;
+}
+
+/**
+ * What is made once the viewer has started.
  *
- * @typedef {import("tetralod").FieldInfo & { number: number, own: import("tetralod").FieldInfo }} ShownField
+ * @type {{ overlay: import("./overlay.js").OverlayView, probes: import("./probes.js").Probes,
+ *   transfer: import("./transfer.js").TransferEditor }}
  */
-
-/**
- * @type {{ viewer?: import("tetralod/viewer").Viewer, overlay?: import("./overlay.js").OverlayView,
- *   probes?: import("./probes.js").Probes, colours?: import("./colours.js").ColourSettings,
- *   transfer?: import("./transfer.js").TransferEditor, flow?: import("./flow.js").FlowSettings,
- *   comparison?: import("./compare.js").Comparison, field?: ShownField,
- *   isovalue?: number, box?: number[] }}
- */
-export const page = {
-  /** The field that is shown, at its time step. */
-  field: undefined,
-  /** In units of the field; the middle of its range without it. */
-  isovalue: undefined,
-  /** Corners of the region, [x0, y0, z0, x1, y1, z1]. */
-  box: undefined,
-};
+export const page = /** @type {any} */ ({});

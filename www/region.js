@@ -1,20 +1,19 @@
 /** The region of the request: a box with handles, the sphere in it, or the side of the clip plane that is shown. */
 
+import { $, all, } from "./dom.js";
 import { diagonalOf, precise } from "./format.js";
-import { $, all } from "./dom.js";
-import { showEmpty } from "./empty.js";
 import { fail } from "./messages.js";
-import { page } from "./page.js";
-import { refine } from "./request.js";
+import { demo, page, viewer } from "./page.js";
 import { plane } from "./planes.js";
+import { store } from "./state.js";
+import { AXES, boxOf } from "./volume.js";
 
-/** Numbers of the box have so many digits: as many as links keep. */
-const DIGITS = 6;
+/** @typedef {import("./volume.js").Box} Box */
 
-/** What the request says of it. */
+/** What the request says of it. @returns {Partial<Pick<import("tetralod/viewer").ViewerRefineOptions, "box" | "sphere" | "slab">>} */
 export function region() {
-  const { box } = page;
-  switch ($("region").value) {
+  const { box } = store.state;
+  switch (store.state.region) {
     case "box":
       return { box };
     case "sphere":
@@ -26,92 +25,72 @@ export function region() {
   }
 }
 
-/** The largest sphere in a box, around its middle. */
-export function sphereIn(box) {
-  const center = [0, 1, 2].map((i) => (box[i] + box[i + 3]) / 2);
-  const radius = Math.min(...[0, 1, 2].map((i) => box[i + 3] - box[i])) / 2;
-  return { center, radius };
+/** The largest sphere in a box, around its middle. @param {Box} box */
+function sphereIn(box) {
+  const middle = (/** @type {number} */ i) => (box[i] + box[i + 3]) / 2;
+  /** @type {import("./volume.js").Point} */
+  const center = [middle(0), middle(1), middle(2)];
+  return { center, radius: Math.min(...AXES.map((i) => box[i + 3] - box[i])) / 2 };
 }
 
 /** Whether the region is a box, or the sphere in it. */
-const hasBox = () => ["box", "sphere"].includes($("region").value);
+const hasBox = () => ["box", "sphere"].includes(store.state.region);
 
 /** The box outside of which everything is cut away; nothing without one. */
-export const cutBox = () => (hasBox() && $("inside").checked ? page.box : undefined);
+export const cutBox = () => (hasBox() && store.state.inside ? store.state.box : undefined);
 
-/** Shows the region that is chosen. */
-export function applyRegion() {
+/** Refines in this box. @param {ArrayLike<number>} box */
+export const useBox = (box) => store.change({ box: boxOf(box), region: "box" });
+
+/** What the viewer has by itself, since its handle was dragged. @type {Box | undefined} */
+let dragged;
+
+/** A handle in the picture was dragged. @param {ArrayLike<number>} box */
+export function boxWasDragged(box) {
+  dragged = boxOf(box);
+  store.change({ box: dragged });
+}
+
+/** Shows the region. The box has handles that the viewer draws; the sphere in it is drawn over the picture. */
+function showRegion() {
+  if (!demo.info) return;
+  const { box } = store.state;
   const on = hasBox();
   $("box").hidden = !on;
   $("inside-row").hidden = !on;
   showNumbers();
-  showSphere();
-  setBoxes({ region: on ? page.box : null });
+  page.overlay.sphere = store.state.region === "sphere" ? sphereIn(box) : undefined;
+  const handles = box === dragged ? {} : { region: on ? box : null };
+  dragged = undefined;
+  viewer().set({ ...handles, clipBox: cutBox() ?? null }).catch(fail);
 }
 
-/** Draws with the box that cuts, and more of the scene. @param {any} [more] */
-function setBoxes(more = {}) {
-  page.viewer.set({ ...more, clipBox: /** @type {any} */ (cutBox() ?? null) }).catch(fail);
-  showEmpty();
-}
-
-/** Refines in this box. */
-export function useBox(wanted) {
-  page.box = rounded(wanted);
-  $("region").value = "box";
-  applyRegion();
-  refine();
-}
-
-/** A handle in the picture was dragged. */
-export function boxWasDragged(moved) {
-  page.box = rounded(moved);
-  showNumbers();
-  showSphere();
-  setBoxes();
-  refine();
-}
-
-/** The middle half of a box. */
-export function inner(bounds) {
-  return rounded(bounds.map((value, i) => value + (bounds[(i + 3) % 6] - value) / 4));
-}
-
-const rounded = (numbers, digits = DIGITS) => Array.from(numbers, (x) => precise(x, diagonalOf(page.viewer.info?.bounds ?? [0, 0, 0, 1, 1, 1]), digits));
-
-/** The box has handles that the viewer draws; the sphere in it is drawn over the picture. */
-function showSphere() {
-  page.overlay.sphere = $("region").value === "sphere" ? sphereIn(page.box) : undefined;
-}
+const inputs = () => /** @type {HTMLInputElement[]} */ (all("#box input"));
+/** Which number of the box an input is of. @param {HTMLInputElement} input */
+const numberOf = (input) => Number(input.dataset.i);
 
 function showNumbers() {
-  for (const input of all("#box input")) {
-    if (document.activeElement !== input) [input.value] = rounded([page.box[input.dataset.i]], 5).map(String);
+  if (!demo.info) return;
+  const length = diagonalOf(demo.info.bounds);
+  for (const input of inputs()) {
+    if (document.activeElement !== input) input.value = String(precise(store.state.box[numberOf(input)], length, 5));
   }
 }
 
-/** Takes the number that was typed if the box stays valid. */
+/** Takes the number that was typed if the box stays valid. @param {HTMLInputElement} input */
 function boxWasTyped(input) {
-  const typed = page.box.slice();
-  typed[input.dataset.i] = input.valueAsNumber;
-  const valid = [0, 1, 2].every((i) => typed[i] <= typed[i + 3]);
+  const typed = [...store.state.box];
+  typed[numberOf(input)] = input.valueAsNumber;
+  const valid = AXES.every((i) => typed[i] <= typed[i + 3]);
   input.setCustomValidity(valid ? "" : "“min” must not be larger than “max”");
   input.reportValidity();
-  if (!valid) return;
-  page.box = rounded(typed);
-  applyRegion();
-  refine();
+  if (valid) store.change({ box: boxOf(typed) });
 }
 
 export function attachRegion() {
-  $("region").addEventListener("input", () => {
-    if (!page.box) return;
-    applyRegion();
-    refine();
-  });
-  $("inside").addEventListener("input", () => page.box && applyRegion());
-  for (const input of all("#box input")) {
+  for (const input of inputs()) {
     input.addEventListener("input", () => boxWasTyped(input));
     input.addEventListener("blur", showNumbers);
   }
+  store.subscribe(["region", "inside", "box"], showRegion);
 }

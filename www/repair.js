@@ -2,7 +2,7 @@
 
 import { element } from "./dom.js";
 
-/** What is said of each level; the first is chosen. */
+/** What is said of each level; the first is chosen. @type {Record<string, { title: string, note: string }>} */
 const LEVELS = {
   safe: {
     title: "safe (default)",
@@ -21,7 +21,7 @@ const LEVELS = {
 export class RepairControls {
   #level = element("select", { id: "repair-level" });
   #note = element("small", { id: "repair-note" });
-  #distance = element("input", { id: "weld-distance", type: "number", min: 0, step: "any", value: 0, required: true });
+  #distance = element("input", { id: "weld-distance", type: "number", min: "0", step: "any", value: "0", required: true });
   #distanceRow = element("div", {});
   /** What the dialog shows. */
   fieldset = element("fieldset", { hidden: true });
@@ -44,7 +44,7 @@ export class RepairControls {
 
   /** As `build` takes them. */
   get options() {
-    const repair = this.#level.value;
+    const repair = /** @type {import("tetralod/build").BuildOptions["repair"]} */ (this.#level.value);
     return repair === "weld" ? { repair, weldDistance: this.#distance.valueAsNumber } : { repair };
   }
 
@@ -60,7 +60,7 @@ export class RepairControls {
   }
 }
 
-const row = (label, control) =>
+const row = (/** @type {string} */ label, /** @type {HTMLElement} */ control) =>
   element("div", { className: "row" }, element("label", { htmlFor: control.id, textContent: label }), control);
 
 /**

@@ -1,115 +1,72 @@
-/** What is drawn: the view, the isovalue, the plane, colours, and the colour bar. */
+/** What is drawn: the view and what is beside it, the plane, colours, and the colour bar. */
 
-import { $, text } from "./dom.js";
-import { rangeOf } from "./fields.js";
-import { precise, rounded } from "./format.js";
-import { expectFrame } from "./empty.js";
-import { showHistogramLine, showVolumes } from "./histogram.js";
-import { showIdle } from "./idle.js";
+import { colours, gradient } from "./colours.js";
+import { comparison } from "./compare.js";
+import { pointsOf } from "./curve.js";
+import { $, element, text } from "./dom.js";
+import { isovalue, isovaluePart, shownField } from "./fields.js";
+import { flowIsByField, flowScene, flowUnit, seedQuad } from "./flow.js";
 import { fail } from "./messages.js";
-import { demo, page } from "./page.js";
-import { attachParts, beside, hasEdges, mode, opacityOf, showParts, shows } from "./parts.js";
-import { isSection, placeOfPlane, plane, seedPlane, showPlace, span, takePlace } from "./planes.js";
-import { refine } from "./request.js";
+import { demo, page, viewer, volume } from "./page.js";
+import { beside, hasEdges, mode, opacityOf, shows } from "./parts.js";
+import { plane } from "./planes.js";
+import { store } from "./state.js";
 import { background } from "./theme.js";
+import { rangeOf } from "./volume.js";
+
+/** @typedef {import("tetralod/viewer").SceneState} SceneState */
+/** @typedef {import("tetralod/viewer").CellState} CellState */
+
+/** What of the state the scene is made of. */
+export const LOOKS = /** @type {const} */ ([
+  ...["view", "also", "opacities", "edges", "field", "time", "surface-colour", "vector", "isovalue", "places", "axis", "flip"],
+  ...["shape", "shrink", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "seeds", "transfer", "map", "reversed"],
+  ...["log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
+]);
 
 /** The surface of the domain around other parts. */
 const SHELL = { opacity: 0.12, colour: "#9fb0c4" };
 
-/** The isovalue has so many digits: as many as links keep. */
-const DIGITS = 6;
-
-/** In units of the field. */
-export function isovalue() {
-  const { min, max } = page.field;
-  return page.isovalue ?? (min + max) / 2;
-}
-
-/** Where a value is in the field's range, 0 to 1. */
-export function fractionOf(value) {
-  const { min, max } = page.field;
-  return max > min ? Math.min(Math.max((value - min) / (max - min), 0), 1) : 0.5;
-}
-
-/** Takes an isovalue at a fraction of the field's range. */
-export function setIsovalue(fraction) {
-  const { min, max } = page.field;
-  page.isovalue = precise(min + fraction * (max - min), max - min, DIGITS);
-  applyIsovalue();
-}
-
-/** Shows the isovalue, which may be one of the volume before: values carry over. */
-export function applyIsovalue() {
-  const { min, max, unit } = page.field;
-  const value = isovalue();
-  $("isovalue").value = 1000 * fractionOf(value);
-  const words = `${rounded(value, max - min)} ${unit}`.trim();
-  text("isovalue-text", words, "isovalue");
-  page.transfer.showIsovalue(words);
-  showHistogramLine(fractionOf(value));
-  draw();
-  if ($("focus").checked) refine();
-}
-
-/** Shows the settings of the view. */
-export function applyMode() {
-  showParts();
-  // Slices and seeds have no side.
-  $("flip").parentElement.hidden = isSection();
-  $("cut-label").textContent = isSection() ? "Plane" : "Clip plane";
-  showPlace();
-  showHistogram().catch(fail);
-  // Draws, too.
-  applyCut();
-}
-
-/** Shows the histogram of the field where the isovalue and the transfer function are chosen. */
-export async function showHistogram() {
-  if (!["iso", "volume"].includes(mode()) || !demo.info || !page.field) return;
-  // That of the file is of the reference mesh; without it, that of the mesh which is shown.
-  const { min, max, histogram: known } = page.field;
-  const histogram = known ?? (await page.viewer.stats({ bins: 100, range: [min, max] })).histogram;
-  page.transfer.volumes = histogram;
-  showVolumes(histogram);
-}
-
 /** Wires beside other parts are thin; points are four times as large (in pixels). */
 const THIN = 0.7;
 
-/** Cells beside other parts: those in front of a plane that is looked at would hide it. */
-const cellsBeside = () => ({ colourBy: $("colour-by").value, ...(mode() === "slice" ? { cut: plane() } : {}) });
+const colourBy = () => /** @type {CellState["colourBy"]} */ (store.state["colour-by"]);
 
-/** What each part of the picture adds to the scene. @type {Record<string, () => import("tetralod/viewer").SceneState>} */
+/** Cells beside other parts: those in front of a plane that is looked at would hide it. */
+const cellsBeside = () => ({ width: THIN, colourBy: colourBy(), ...(mode() === "slice" ? { cut: plane() } : {}) });
+
+/** The opacities of the values of the field that is shown. @returns {[value: number, opacity: number][]} */
+function opacities() {
+  const { min, max } = shownField();
+  return pointsOf(store.state.transfer, isovaluePart()).map(([at, opacity]) => [min + at * (max - min), opacity * opacityOf("volume")]);
+}
+
+/** What each part of the picture adds to the scene. @type {Record<string, () => SceneState>} */
 const PARTS = {
   iso() {
-    const by = $("surface-colour").value;
-    const isBy = by ? { field: by } : {};
-    return { isosurfaces: [{ value: isovalue(), opacity: opacityOf("iso"), edges: hasEdges("iso"), ...isBy }] };
+    const by = store.state["surface-colour"];
+    return { isosurfaces: [{ value: isovalue(), opacity: opacityOf("iso"), edges: hasEdges("iso"), ...(by ? { field: by } : {}) }] };
   },
-  volume: () => ({ volume: { opacities: page.transfer.opacities(page.field, opacityOf("volume")) } }),
+  volume: () => ({ volume: { opacities: opacities() } }),
   slice: () => ({ slices: [{ ...plane(), opacity: opacityOf("slice"), edges: hasEdges("slice") }] }),
   solid() {
     if (mode() !== "solid") return { boundary: SHELL };
     return { boundary: { opacity: opacityOf("solid"), edges: hasEdges("solid") }, clips: [plane()] };
   },
   mesh() {
-    const shrink = Number($("shrink").value) / 100;
-    return { cells: { shape: $("shape").value, shrink, cut: plane(), colourBy: $("colour-by").value, edges: hasEdges("mesh") } };
+    const shape = /** @type {CellState["shape"]} */ (store.state.shape);
+    return { cells: { shape, shrink: store.state.shrink / 100, cut: plane(), colourBy: colourBy(), edges: hasEdges("mesh") } };
   },
-  wires: () => ({ cells: { shape: "wire", width: THIN, ...cellsBeside() } }),
-  points: () => ({ cells: { shape: "points", width: THIN, ...cellsBeside() } }),
-  flow() {
-    const { flow, field } = page;
-    const whole = flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field });
-    return mode() === "flow" ? { ...whole, boundary: $("flow-boundary").checked ? SHELL : undefined } : whole;
-  },
+  wires: () => ({ cells: { shape: "wire", ...cellsBeside() } }),
+  points: () => ({ cells: { shape: "points", ...cellsBeside() } }),
+  flow: () => ({ ...flowScene(), ...(mode() === "flow" && store.state["flow-boundary"] ? { boundary: SHELL } : {}) }),
 };
 
 /** Whether anything has the colours of the field that is shown, whose range can be chosen. */
 function isByField() {
-  const by = $("surface-colour").value;
-  const cells = $("colour-by").value === "field";
-  const is = { iso: by === page.field.name, mesh: cells, wires: cells, points: cells, flow: page.flow.isByField };
+  const cells = colourBy() === "field";
+  /** @type {Record<string, boolean>} */
+  const is = { iso: store.state["surface-colour"] === store.state.field, mesh: cells, wires: cells, points: cells, flow: flowIsByField() };
   // Around other parts, the boundary has a colour of its own.
   return is[mode()] ?? (["volume", "slice", "solid"].includes(mode()) || beside().some((name) => is[name] ?? name !== "solid"));
 }
@@ -117,97 +74,70 @@ function isByField() {
 /** Draws what the settings say. */
 export function draw() {
   if (!demo.info) return;
-  const { viewer, flow, colours, comparison } = page;
-  text("opacity-text", `${$("opacity").value} %`, "opacity");
-  text("shrink-text", `${$("shrink").value} %`, "shrink");
-  text("shade-text", `${$("shade").value} %`, "shade");
-  const by = $("surface-colour").value;
+  const { shrink, shade, outline, "surface-colour": by } = store.state;
+  text("shrink", `${shrink} %`);
+  text("shade", `${shade} %`);
   $("colours").hidden = mode() === "iso" && !by && !beside().some((name) => name !== "solid");
   $("range").hidden = !isByField();
-  page.overlay.quad = mode() === "flow" ? flow.quad({ bounds: demo.info.bounds, plane: seedPlane() }) : undefined;
+  page.overlay.quad = mode() === "flow" ? seedQuad() : undefined;
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [], streamlines: null, arrows: null };
   const parts = [...beside(), mode()].map((name) => PARTS[name]());
-  const compare = comparison.state;
+  const compare = comparison();
   // A difference has values on both sides of 0.
   const diverging = compare?.difference ? { map: "coolwarm" } : {};
   const range = shows("iso") && by && !isByField() ? { range: ownRange(by) } : {};
-  const box = { outline: $("outline").checked, shade: $("shade").value / 100 };
-  const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare, ...box };
-  viewer.set(/** @type {any} */ (Object.assign(nothing, ...parts, looks))).catch(fail);
-  showIdle();
-  expectFrame();
+  const looks = { colours: { ...colours(), ...range, ...diverging }, background: background(), compare, outline, shade: shade / 100 };
+  viewer().set(Object.assign(nothing, ...parts, looks)).catch(fail);
 }
 
-/** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. */
+/** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. @param {string} name @returns {[number, number]} */
 function ownRange(name) {
   const [min, max] = rangeOf(name);
   const most = Math.max(-min, max);
   return min < 0 && max > 0 ? [-most, most] : [min, max];
 }
 
-/** The colour bar of what is drawn. */
+/** The colour bar of what is drawn. @param {import("tetralod/viewer").Legend | undefined} legend */
 export function showLegend(legend) {
-  const { overlay, field, transfer, colours } = page;
   $("legend").hidden = !legend;
-  if (!legend) return overlay.refresh();
+  if (!legend || !demo.info) return page.overlay.refresh();
   const { label, ticks } = legend;
   const unit = unitOf(label);
   $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
-  if (label === field?.name) transfer.colours = colours.gradient(legend);
+  if (label === store.state.field) $("transfer-bar").style.background = gradient(legend);
   $("legend-bar").dataset.colours = legend.colours.join(" ");
   $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
   // The ends of the range are shown in any case, what is between them where there is room.
-  const isEnd = ({ fraction }) => fraction === 0 || fraction === 1;
-  $("legend-ticks").replaceChildren(...[...ticks.filter(isEnd), ...ticks.filter((tick) => !isEnd(tick))].map(tickElement));
-  leaveOutOverlaps($("legend-ticks"));
-  overlay.refresh();
+  const isEnd = (/** @type {{ fraction: number }} */ { fraction }) => fraction === 0 || fraction === 1;
+  const shown = [...ticks.filter(isEnd), ...ticks.filter((tick) => !isEnd(tick))].map(tickElement);
+  $("legend-ticks").replaceChildren(...shown);
+  leaveOutOverlaps(shown);
+  page.overlay.refresh();
 }
 
-/** The unit of what a legend is of: a field, or the length of the vector that is shown. */
-export function unitOf(label) {
-  const field = [page.field, ...(demo.info?.fields ?? [])].find((one) => one?.name === label);
-  if (field) return field.unit;
-  return shows("flow") ? page.flow.unit : "";
+/** The unit of what a legend is of: a field, or the length of the vector that is shown. @param {string} label */
+function unitOf(label) {
+  const field = volume().fields.find(({ name }) => name === label);
+  return field?.unit ?? (shows("flow") ? flowUnit() : "");
 }
 
+/** @param {{ label: string, fraction: number }} tick */
 function tickElement({ label, fraction }) {
-  const tick = document.createElement("span");
-  tick.textContent = label.replaceAll("-", "−");
+  const tick = element("span", {}, label.replaceAll("-", "−"));
   tick.style.left = `${100 * fraction}%`;
   if (fraction === 0 || fraction === 1) tick.className = fraction === 0 ? "first" : "last";
   return tick;
 }
 
-/** Hides the ticks whose words would touch those of one before. */
+/** Hides the ticks whose words would touch those of one before. @param {HTMLElement[]} ticks */
 function leaveOutOverlaps(ticks) {
+  /** @type {{ left: number, right: number }[]} */
   const taken = [];
-  for (const tick of ticks.children) {
+  for (const tick of ticks) {
     const { left, right } = tick.getBoundingClientRect();
     tick.hidden = taken.some((other) => left < other.right + 4 && right > other.left - 4);
     if (!tick.hidden) taken.push({ left, right });
   }
 }
 
-/** Shows where the plane is. */
-export function applyCut() {
-  if (!demo.info) return;
-  const { axis, low, high } = span();
-  const at = placeOfPlane();
-  const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : precise(at, high - low, 3);
-  const side = $("flip").checked ? "<" : ">";
-  const shown = isSection() ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
-  text("cut-text", shown, "cut");
-  draw();
-  if ($("region").value === "cut") refine();
-}
-
-export function attachScene() {
-  attachParts({ onView: applyMode, onChange: draw });
-  $("isovalue").addEventListener("input", () => page.field && setIsovalue($("isovalue").value / 1000));
-  $("cut").addEventListener("input", () => {
-    takePlace();
-    applyCut();
-  });
-  for (const id of ["axis", "flip"]) $(id).addEventListener("input", applyCut);
-  for (const id of ["colour-by", "surface-colour", "outline", "shade"]) $(id).addEventListener("input", draw);
-}
+export const attachScene = () => store.subscribe(LOOKS, draw);

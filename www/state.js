@@ -1,228 +1,416 @@
 /**
- * The whole state of the page as one plain object of words: what is open, all settings, the camera. It is in the address of the
- * page, so that a reload or a link shows the same, and undo and redo go back and forth in it. Words that are the default are
- * left out.
+ * The state of the page: everything that is set, in one store. Controls show it and change it; the address, undo and redo are
+ * made of it. A control that is part of it has an entry here, under its name in the address. Values that are the default are left
+ * out of there.
  */
 
-import { $, all, checked } from "./dom.js";
-import { chooseField, isPlaying, rangeOf } from "./fields.js";
+import { curveOf, curveWords } from "./curve.js";
+import { $, named } from "./dom.js";
 import { precise, rounded } from "./format.js";
-import { fail } from "./messages.js";
-import { open, sourceWords } from "./opening.js";
-import { demo, page } from "./page.js";
-import { words as ofParts } from "./parts.js";
-import { words as ofPlanes } from "./planes.js";
-import { applyRegion, inner } from "./region.js";
-import { applyFrameTime, applyRefineBy, errorPositions } from "./request.js";
-import { applyMode } from "./scene.js";
-import { note } from "./share.js";
-import { applyTheme } from "./theme.js";
+import { demo, volume } from "./page.js";
+import { Store } from "./store.js";
+import { fieldNames, inner, isInside, rangeOf, stepsOf, vectors } from "./volume.js";
 
-/** The state is written when nothing has changed for so long (in ms). */
-const QUIET = 300;
-/** So many states can be undone. */
-const MOST = 200;
+/** @typedef {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} Mode */
+/** @typedef {import("tetralod/viewer").CameraState} Camera */
+/** @typedef {import("./volume.js").Point} Point */
+/** The values of the first and the last colour. @typedef {"data" | "percentiles" | "symmetric" | [low: number, high: number]} Range */
+/** @typedef {Record<string, string>} Words */
+
+/** Controls that have a value of their own, which no volume takes away: they are bound to it by their ids. */
+const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
+  ["outline", "inside", "arrows", "flow-boundary", "reversed", "log", "flip", "focus", "axes", "fly"],
+  ["shrink", "shade", "rake", "pixels", "budget", "frame-time"],
+  ["shape", "colour-by", "flow-colour", "map", "axis", "region", "background"],
+]);
+
+/**
+ * @typedef {object} Others
+ * @property {Mode} view
+ * @property {readonly string[]} also what was chosen to be shown beside the view
+ * @property {Record<string, number>} opacities of each part, in percent
+ * @property {Record<string, boolean>} edges
+ * @property {string} field
+ * @property {number} time its step
+ * @property {string} surface-colour
+ * @property {string} vector
+ * @property {number | undefined} isovalue in units of the field; the middle of its range without it
+ * @property {{ cut: number, section: number }} places of the planes, in thousandths of the model's length
+ * @property {"field" | "view"} refine
+ * @property {number} error where its slider is
+ * @property {number} outside where that is by screen error: then it applies outside of the view, and may be coarser
+ * @property {import("./volume.js").Box} box
+ * @property {Range} range
+ * @property {import("./curve.js").Curve} transfer
+ * @property {readonly Point[]} seeds that were placed by clicks
+ * @property {readonly Point[]} probes
+ * @property {Camera | undefined} camera that with which the volume is shown first without it
+ */
+
+/** What is not in the address. @typedef {{ playing: boolean, dark: boolean, freeze: boolean, kept: boolean, split: number, difference: boolean }} Passing */
+
+/**
+ * @typedef {Record<(typeof FLAGS)[number], boolean> & Record<(typeof SLIDERS)[number], number> & Record<(typeof CHOICES)[number], string>
+ *   & Others & Passing} State
+ */
+
+/** Words of the address: `get` gives none for what there is first, `set` never gets none and tells whether they mean something. */
+/** @typedef {{ get: (state: Readonly<State>) => string, set: (words: string, draft: State) => boolean }} Entry */
+
+/** Parts that have an opacity, in the order that links have. */
+const SHEER = ["iso", "volume", "slice", "solid"];
+/** Parts whose edges can be drawn, and whether they are drawn first. @type {Record<string, boolean>} */
+const EDGES = { iso: false, slice: true, solid: true, mesh: true };
+const OPAQUE = 100;
+/** Of planes, in thousandths of the model's length. */
+export const MIDDLE = 500;
 /** Digits of numbers of the camera; those of the mesh's request have fewer, and are rounded before they are used. */
 const CAMERA_DIGITS = 9;
 
-/** @typedef {Record<string, string>} Words */
-/** `set` gives false for words that mean nothing, whatever the volume. @typedef {{ get: () => string, set: (words: string) => unknown }} Entry */
-
+/** @param {string} words */
 const numbers = (words) => words.split(",").map(Number);
+/** @param {string} words @param {number} count */
 const isNumbers = (words, count) => numbers(words).length === count && numbers(words).every(Number.isFinite);
 
-/** Whether words are a box: its corner of the least numbers, and that of the largest ones. */
-const isBox = (words) => isNumbers(words, 6) && [0, 1, 2].every((i) => numbers(words)[i] <= numbers(words)[i + 3]);
+/** @param {string} words */
+function points(words) {
+  const all = words ? numbers(words) : [];
+  const found = all.flatMap((_, i) => (i % 3 === 0 && i + 2 < all.length ? [/** @type {Point} */ (all.slice(i, i + 3))] : []));
+  return all.every(Number.isFinite) ? found : [];
+}
 
-/** A control whose default is what it has in the page as it was loaded. @returns {Entry} */
+/** The controls with values of their own. */
+const bound = [...FLAGS, ...SLIDERS, ...CHOICES].map((id) => ({ id, element: /** @type {HTMLInputElement | HTMLSelectElement} */ ($(id)) }));
+
+/** @param {HTMLInputElement | HTMLSelectElement} element */
+function taken(element) {
+  if (element instanceof HTMLSelectElement) return element.value;
+  return element.type === "checkbox" ? element.checked : element.valueAsNumber;
+}
+
+/** @param {HTMLInputElement | HTMLSelectElement} element @param {unknown} value */
+function put(element, value) {
+  if (element instanceof HTMLInputElement && element.type === "checkbox") element.checked = value === true;
+  else element.value = String(value);
+}
+
+/** What these controls have in the page as it was loaded. */
+const loaded = Object.fromEntries(bound.map(({ id, element }) => [id, taken(element)]));
+
+/** The entry of such a control. @param {(typeof bound)[number]["id"]} id @returns {Entry} */
 function control(id) {
-  const element = $(id);
-  const isBox = element.type === "checkbox";
-  const read = () => (isBox ? String(Number(element.checked)) : element.value);
-  const initial = read();
-  const put = (words) => (isBox ? (element.checked = words === "1") : (element.value = words));
-  const set = (words) => {
-    put(words);
-    if (read() === words) return true;
-    // What it does not take would leave it empty, or at another value.
-    put(initial);
-    return false;
-  };
-  return { get: () => (read() === initial ? "" : read()), set: (words) => set(words || initial) };
-}
-
-/** A list whose options come from the file; the default is the first. @returns {Entry} */
-function list(id) {
-  const set = (words) => {
-    const at = [...$(id).options].findIndex(({ value }) => value === words);
-    $(id).selectedIndex = Math.max(at, 0);
-  };
-  return { get: () => ($(id).selectedIndex > 0 ? $(id).value : ""), set };
-}
-
-/** Radio buttons of a name. @returns {Entry} */
-function radios(name) {
-  const initial = checked(name);
-  const set = (words) => {
-    const named = (choice) => all(`[name=${name}]`).find(({ value }) => value === choice);
-    const wanted = named(words || initial);
-    (wanted && !wanted.disabled ? wanted : named(initial)).checked = true;
-    return Boolean(wanted);
-  };
-  return { get: () => (checked(name) === initial ? "" : checked(name)), set };
-}
-
-/** A position of the slider of errors. @returns {Entry} */
-function errorPosition(kind) {
-  const initial = String(errorPositions[kind]);
+  const probe = /** @type {HTMLInputElement | HTMLSelectElement} */ ($(id).cloneNode(true));
+  /** @param {unknown} value */
+  const words = (value) => String(typeof value === "boolean" ? Number(value) : value);
   return {
-    get: () => (String(errorPositions[kind]) === initial ? "" : String(errorPositions[kind])),
-    set: (words) => (errorPositions[kind] = Number(words || initial)),
+    get: (state) => (state[id] === loaded[id] ? "" : words(state[id])),
+    set(given, draft) {
+      put(probe, typeof loaded[id] === "boolean" ? given === "1" : given);
+      // What the control does not take would leave it empty, or at another value.
+      if (words(taken(probe)) !== given) return false;
+      Object.assign(draft, { [id]: taken(probe) });
+      return true;
+    },
   };
 }
 
-/** @returns {Record<string, Entry>} */
-function makeEntries() {
-  const ids = ["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
-  const more = ["axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"];
-  const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
-  const time = control("time");
+/** A name from a list that the volume has, the default is its first. @param {"field" | "surface-colour" | "vector"} id @param {() => string[]} names @returns {Entry} */
+const list = (id, names) => ({
+  get: (state) => (state[id] === names()[0] ? "" : state[id]),
+  set(words, draft) {
+    if (names().includes(words)) draft[id] = words;
+    return true;
+  },
+});
+
+const colourNames = () => ["", ...fieldNames()];
+const vectorNames = () => [...vectors().keys(), ""];
+
+/** A choice of radio buttons. @param {"view" | "refine"} id @param {string} name @returns {Entry} */
+const radios = (id, name) => ({
+  get: (state) => (state[id] === loadedChoice(name) ? "" : state[id]),
+  set(words, draft) {
+    const isOne = named(name).some(({ value }) => value === words);
+    if (isOne) Object.assign(draft, { [id]: words });
+    return isOne;
+  },
+});
+
+/** @param {string} name */
+const loadedChoice = (name) => named(name).find(({ defaultChecked }) => defaultChecked)?.value ?? "";
+
+/** A place of the slider of errors. @param {"error" | "outside"} id @returns {Entry} */
+const errorPlace = (id) => ({
+  get: (state) => (state[id] === FIRST[id] ? "" : String(state[id])),
+  set(words, draft) {
+    const isPlace = Number(words) >= 0 && Number(words) <= 100;
+    if (isPlace) draft[id] = Number(words);
+    return isPlace;
+  },
+});
+
+/** Whether the plane of a view is one to look at, and cuts nothing away. @param {Readonly<Pick<State, "view">>} state */
+export const isSection = ({ view }) => view === "slice" || view === "flow";
+
+/** The place of the view's plane, or of the other one. @param {boolean} isOther @returns {Entry} */
+function place(isOther) {
+  /** @param {Readonly<State>} state */
+  const plane = (state) => (isSection(state) !== isOther ? "section" : "cut");
   return {
-    view: radios("mode"),
-    also: ofParts.also,
-    opacity: ofParts.opacity,
-    edges: ofParts.edges,
-    field: list("field"),
-    "surface-colour": list("surface-colour"),
-    vector: list("vector"),
-    isovalue: {
-      get: () => String(page.isovalue ?? ""),
-      set: (words) => {
-        const isOne = isNumbers(words, 1);
-        page.isovalue = words && isOne ? Number(words) : undefined;
-        return isOne;
-      },
+    get: (state) => (state.places[plane(state)] === MIDDLE ? "" : String(state.places[plane(state)])),
+    set(words, draft) {
+      if (Number(words) >= 0 && Number(words) <= 1000) draft.places = { ...draft.places, [plane(draft)]: Number(words) };
+      return true;
     },
-    ...ofPlanes,
-    ...simple,
-    // Which times there are is up to the volume.
-    time: { get: time.get, set: (words) => void time.set(words) },
-    refine: radios("refine-by"),
-    error: errorPosition("field"),
-    outside: errorPosition("view"),
-    box: {
-      get: () => (String(page.box) === String(inner(demo.info.bounds)) ? "" : String(page.box)),
-      set: (words) => {
-        page.box = isBox(words) ? numbers(words) : inner(demo.info.bounds);
-        return words === "" || isBox(words);
-      },
-    },
-    range: {
-      get: () => page.colours.words,
-      set: (words) => {
-        page.colours.words = words;
-        return words === "" || page.colours.words !== "";
-      },
-    },
-    transfer: { get: () => page.transfer.words, set: (words) => (page.transfer.words = words) },
-    seeds: { get: () => page.flow.words, set: (words) => (page.flow.words = words) },
-    probes: { get: () => page.probes.words, set: (words) => (page.probes.words = words) },
-    camera: { get: cameraWords, set: setCamera },
   };
 }
 
-/** @type {Record<string, Entry>} */
-let entries;
+/** Points of the model. @param {"seeds" | "probes"} id @returns {Entry} */
+const places = (id) => ({
+  get: (state) => String(state[id].flat()),
+  set(words, draft) {
+    draft[id] = points(words);
+    return true;
+  },
+});
 
-/** The camera as a volume is shown first. @type {import("tetralod/viewer").CameraState | undefined} */
-let home;
-
-/** The words of a camera that was set, until the viewer has it. @type {string | undefined} */
-let awaited;
-let isSet = true;
-
-const wordsOf = (camera) => {
-  const { target, distance, yaw, pitch, projection } = camera;
+/** @param {Camera} camera */
+export function cameraWords({ target, distance, yaw, pitch, projection }) {
   const place = target.map((x) => precise(x, distance, CAMERA_DIGITS));
   const all = [...place, ...[distance, yaw, pitch].map((x) => Number(x.toPrecision(CAMERA_DIGITS)))];
   return `${all}${projection === "orthographic" ? ",orthographic" : ""}`;
+}
+
+/** The camera with which the volume is shown first. @type {Camera | undefined} */
+let home;
+
+/** @param {Camera | undefined} camera */
+export const setHome = (camera) => void (home = camera);
+export const homeCamera = () => home;
+
+/** In the order of the address: what others depend on comes before them. @type {Record<string, Entry>} */
+const ENTRIES = {
+  view: radios("view", "mode"),
+  also: {
+    get: ({ also }) => String(also),
+    set(words, draft) {
+      draft.also = named("also").map(({ value }) => value).filter((name) => words.split(",").includes(name));
+      return true;
+    },
+  },
+  opacity: {
+    // One number is that of the view.
+    get({ opacities, view }) {
+      const isFirst = (/** @type {string} */ name) => opacities[name] === OPAQUE;
+      if (SHEER.every(isFirst)) return "";
+      return SHEER.every((name) => name === view || isFirst(name)) ? String(opacities[view]) : String(SHEER.map((name) => opacities[name]));
+    },
+    set(words, draft) {
+      const all = numbers(words);
+      const held = (/** @type {number} */ number) => (number >= 5 && number <= OPAQUE ? number : OPAQUE);
+      const one = (/** @type {string} */ name) => (name === draft.view ? all[0] : OPAQUE);
+      draft.opacities = Object.fromEntries(SHEER.map((name, i) => [name, held(all.length === SHEER.length ? all[i] : one(name))]));
+      return true;
+    },
+  },
+  edges: {
+    // The parts that are not as first.
+    get: ({ edges }) => String(Object.keys(EDGES).filter((name) => edges[name] !== EDGES[name])),
+    set(words, draft) {
+      const others = words.split(",");
+      draft.edges = Object.fromEntries(Object.entries(EDGES).map(([name, first]) => [name, first !== others.includes(name)]));
+      return true;
+    },
+  },
+  field: list("field", fieldNames),
+  "surface-colour": list("surface-colour", colourNames),
+  vector: list("vector", vectorNames),
+  isovalue: {
+    get: ({ isovalue }) => String(isovalue ?? ""),
+    set(words, draft) {
+      const isOne = isNumbers(words, 1);
+      if (isOne) draft.isovalue = Number(words);
+      return isOne;
+    },
+  },
+  cut: place(false),
+  "other-cut": place(true),
+  shape: control("shape"),
+  shrink: control("shrink"),
+  outline: control("outline"),
+  shade: control("shade"),
+  inside: control("inside"),
+  "colour-by": control("colour-by"),
+  "flow-colour": control("flow-colour"),
+  rake: control("rake"),
+  arrows: control("arrows"),
+  "flow-boundary": control("flow-boundary"),
+  map: control("map"),
+  reversed: control("reversed"),
+  log: control("log"),
+  axis: control("axis"),
+  flip: control("flip"),
+  pixels: control("pixels"),
+  budget: control("budget"),
+  region: control("region"),
+  focus: control("focus"),
+  background: control("background"),
+  axes: control("axes"),
+  fly: control("fly"),
+  "frame-time": control("frame-time"),
+  time: {
+    get: ({ time }) => (time === 0 ? "" : String(time)),
+    set(words, draft) {
+      if (/^\d+$/.test(words)) draft.time = Number(words);
+      return true;
+    },
+  },
+  refine: radios("refine", "refine-by"),
+  error: errorPlace("error"),
+  outside: errorPlace("outside"),
+  box: {
+    get: ({ box }) => (String(box) === String(inner()) ? "" : String(box)),
+    set(words, draft) {
+      const box = numbers(words);
+      const isBox = isNumbers(words, 6) && [0, 1, 2].every((i) => box[i] <= box[i + 3]);
+      if (isBox) draft.box = /** @type {import("./volume.js").Box} */ (box);
+      return isBox;
+    },
+  },
+  range: {
+    get: ({ range }) => (range === "data" ? "" : String(range)),
+    set(words, draft) {
+      const [low, high] = numbers(words);
+      if (words === "percentiles" || words === "symmetric") draft.range = words;
+      else if (low < high) draft.range = [low, high];
+      return draft.range !== "data";
+    },
+  },
+  transfer: {
+    get: ({ transfer }) => curveWords(transfer),
+    set(words, draft) {
+      draft.transfer = curveOf(words);
+      return true;
+    },
+  },
+  seeds: places("seeds"),
+  probes: places("probes"),
+  camera: {
+    get: ({ camera }) => (camera && !(home && cameraWords(camera) === cameraWords(home)) ? cameraWords(camera) : ""),
+    set(words, draft) {
+      const [x, y, z, distance, yaw, pitch] = numbers(words);
+      const isWhole = [x, y, z, distance, yaw, pitch].every(Number.isFinite) && distance > 0;
+      /** @type {Camera["projection"]} */
+      const projection = words.endsWith(",orthographic") ? "orthographic" : "perspective";
+      if (isWhole) draft.camera = { target: [x, y, z], distance, yaw, pitch, projection };
+      return isWhole;
+    },
+  },
 };
 
-function cameraWords() {
-  const { camera } = page.viewer.state;
-  home ??= camera;
-  const words = awaited ?? (camera ? wordsOf(camera) : "");
-  return home && words === wordsOf(home) ? "" : words;
+/** What there is first of what no volume changes. @type {Omit<Others, "field" | "vector" | "box">} */
+const FIRST = {
+  view: /** @type {Mode} */ (loadedChoice("mode")),
+  also: [],
+  opacities: Object.fromEntries(SHEER.map((name) => [name, OPAQUE])),
+  edges: EDGES,
+  "surface-colour": "",
+  time: 0,
+  isovalue: undefined,
+  places: { cut: MIDDLE, section: MIDDLE },
+  refine: "field",
+  error: 50,
+  outside: 78,
+  range: "data",
+  transfer: curveOf(""),
+  seeds: [],
+  probes: [],
+  camera: undefined,
+};
+
+/** @type {Passing} */
+const PASSING = { playing: false, dark: true, freeze: false, kept: false, split: 50, difference: false };
+
+/** @returns {State} */
+const first = () => /** @type {State} */ ({ ...loaded, ...FIRST, field: fieldNames()[0], vector: vectorNames()[0], box: inner() });
+
+/** The one that the page has. @type {Store<State>} */
+export const store = new Store(/** @type {State} */ ({ ...loaded, ...FIRST, ...PASSING, field: "", vector: "", box: [0, 0, 0, 1, 1, 1] }), settled);
+
+/** What fits the volume, and values that fit each other. @param {State} state @returns {State} */
+function settled(state) {
+  if (!demo.info) return state;
+  const hasVectors = vectors().size > 0;
+  const canBe = (/** @type {string} */ name) => (name !== "flow" || hasVectors) && (name !== "wires" || !state.also.includes("points"));
+  const log = state.log && rangeOf(state.field)[1] > 0;
+  return {
+    ...state,
+    view: state.view === "flow" && !hasVectors ? FIRST.view : state.view,
+    // A mesh is drawn in one way.
+    also: state.also.every(canBe) ? state.also : state.also.filter(canBe),
+    time: state.time < stepsOf(state.field).length ? state.time : 0,
+    log,
+    // No range of positive numbers has 0 in its middle.
+    range: log && state.range === "symmetric" ? "data" : state.range,
+  };
 }
 
-function setCamera(words) {
-  const [x, y, z, distance, yaw, pitch] = numbers(words);
-  const isOrthographic = words.endsWith(",orthographic");
-  const isWhole = [x, y, z, distance, yaw, pitch].every(Number.isFinite) && distance > 0;
-  $("orthographic").checked = isWhole && isOrthographic;
-  /** @type {"orthographic" | "perspective"} */
-  const projection = isOrthographic ? "orthographic" : "perspective";
-  const camera = isWhole ? { target: /** @type {[number, number, number]} */ ([x, y, z]), distance, yaw, pitch, projection } : home;
-  if (camera) {
-    awaited = wordsOf(camera);
-    isSet = false;
-    const mine = awaited;
-    page.viewer.set({ camera }).then(() => (isSet ||= mine === awaited), fail);
-  }
-  return words === "" || isWhole;
+/** All words of the state but that of the volume. */
+export function words() {
+  const all = Object.entries(ENTRIES).map(([name, { get }]) => [name, get(store.state)]);
+  return /** @type {Words} */ (Object.fromEntries(all.filter(([, word]) => word !== "")));
 }
 
-function cameraMoved({ detail }) {
-  if (isSet || wordsOf(detail) === awaited) awaited = undefined;
-  changed();
-}
-
-/** The state of the page now, as a plain object. @returns {Words} */
-export function stateNow() {
-  const words = { url: sourceWords(), ...Object.fromEntries(Object.entries(entries).map(([name, { get }]) => [name, get()])) };
-  return Object.fromEntries(Object.entries(words).filter(([, word]) => word !== ""));
-}
-
-/** As it is written in the address. Commas and slashes need no escapes there. @param {Words} words */
-function written(words) {
-  return new URLSearchParams(words).toString().replaceAll("%2C", ",").replaceAll("%2F", "/");
-}
-
-/** @returns {Words} */
-export const read = (text) => Object.fromEntries(new URLSearchParams(text.replace(/^#/, "")));
-
-/** What stays when another volume takes the place of one: all that has no place in its model. @returns {Words} */
+/** What stays when another volume takes the place of one: all that has no place in its model. */
 export function carriedOver() {
-  const { camera, box, seeds, probes, time, url, ...rest } = stateNow();
+  const { camera, box, seeds, probes, time, ...rest } = words();
   return rest;
 }
 
-/** Points of the model that are inside of the volume. @param {string} words */
-function inside(words) {
-  const { bounds } = demo.info;
-  const all = numbers(words);
-  const points = all.flatMap((_, i) => (i % 3 === 0 && i + 2 < all.length ? [all.slice(i, i + 3)] : []));
-  return points.filter((point) => point.every((x, i) => x >= bounds[i] && x <= bounds[i + 3]));
+/** As it is written in the address. Commas and slashes need no escapes there. @param {Words} words */
+export const written = (words) => new URLSearchParams(words).toString().replaceAll("%2C", ",").replaceAll("%2F", "/");
+
+/** @param {string} text @returns {Words} */
+export const read = (text) => Object.fromEntries(new URLSearchParams(text.replace(/^#/, "")));
+
+/**
+ * Takes the words for a state of the volume that is open. What means nothing is ignored, and given.
+ *
+ * @param {Words} given
+ */
+export function show({ url, ...given }) {
+  const draft = first();
+  const isTaken = (/** @type {string} */ name, /** @type {string} */ words) => words === "" || ENTRIES[name]?.set(words, draft);
+  // In the order of the entries, whatever that of the words.
+  const order = [...Object.keys(ENTRIES).filter((name) => name in given), ...Object.keys(given).filter((name) => !ENTRIES[name])];
+  const ignored = order.filter((name) => !isTaken(name, given[name]));
+  store.replace(draft);
+  return ignored.map((name) => `${name}=${given[name]}`);
 }
+
+/** @param {number} low @param {number} high */
+const rangeWords = (low, high) => `${rounded(low, high - low)} to ${rounded(high, high - low)}`;
+
+/** @typedef {[kept: string, lost: string] | undefined} Judgement */
 
 /**
  * What words mean of the volume that has arrived, where that is not all that they say, and what is not there; nothing where all is.
  *
- * @type {Record<string, (words: string, field: string) => [kept: string, lost: string] | undefined>}
+ * @type {Record<string, (words: string, field: string) => Judgement>}
  */
 const LIMITS = {
-  isovalue: (words, field) => {
+  isovalue(words, field) {
     const [low, high] = rangeOf(field);
     const isThere = !isNumbers(words, 1) || (Number(words) >= low && Number(words) <= high);
     return isThere ? undefined : ["", `isovalue ${words} (${field} is ${rangeWords(low, high)})`];
   },
-  range: (words, field) => {
+  range(words, field) {
     const [low, high] = rangeOf(field);
     const [from, to] = numbers(words);
     return !isNumbers(words, 2) || (to >= low && from <= high) ? undefined : ["", `colours of ${rangeWords(from, to)} (${field} is ${rangeWords(low, high)})`];
   },
-  box: (words) => {
-    const { bounds } = demo.info;
+  box(words) {
+    const { bounds } = volume();
     const box = numbers(words);
     const meets = [0, 1, 2].every((i) => box[i] <= bounds[i + 3] && box[i + 3] >= bounds[i]);
     return !isNumbers(words, 6) || meets ? undefined : ["", "the box of the region"];
@@ -231,164 +419,48 @@ const LIMITS = {
   probes: (words) => pointsLeft(words, "probes"),
 };
 
-const rangeWords = (low, high) => `${rounded(low, high - low)} to ${rounded(high, high - low)}`;
-
-/** @returns {[kept: string, lost: string] | undefined} */
+/** @param {string} words @param {string} what @returns {Judgement} */
 function pointsLeft(words, what) {
-  const left = inside(words);
-  const count = Math.floor(numbers(words).length / 3) - left.length;
-  return count > 0 ? [String(left.flat()), `${count} ${what} outside`] : undefined;
+  const all = points(words);
+  const left = all.filter(isInside);
+  return left.length < all.length ? [String(left.flat()), `${all.length - left.length} ${what} outside`] : undefined;
 }
 
 /** The words of which the volume has something, and what it has not. @param {Words} words @returns {[kept: Words, lost: string[]]} */
 function fitting(words) {
-  const field = [...$("field").options].some(({ value }) => value === words.field) ? words.field : demo.info.fields[0].name;
+  const field = fieldNames().includes(words.field) ? words.field : fieldNames()[0];
   const [kept, lost] = [{ ...words }, /** @type {string[]} */ ([])];
   for (const [name, judge] of Object.entries(LIMITS)) {
-    const [left, what] = (words[name] && judge(words[name], field)) || [];
-    if (what === undefined) continue;
-    kept[name] = left;
-    lost.push(what);
+    const judged = words[name] ? judge(words[name], field) : undefined;
+    if (!judged) continue;
+    kept[name] = judged[0];
+    lost.push(judged[1]);
   }
   return [kept, lost];
 }
 
-/** What of some words no control has taken. @param {Words} words */
+/** What of some words is not in the state. @param {Words} words */
 function untaken(words) {
-  const isNot = (id) => words[id] && $(id).value !== words[id];
-  const label = (name, value) => document.querySelector(`[name=${name}][value="${value}"]`)?.parentElement.textContent.trim() ?? value;
-  const lists = { field: "field", "surface-colour": "colours of", vector: "vector", time: "time step" };
-  const lost = Object.entries(lists).flatMap(([id, what]) => (isNot(id) ? [`${what} ${words[id]}`] : []));
-  if (words.view !== checked("mode") && all("[name=mode]").some(({ value }) => value === words.view)) lost.push(`view ${label("mode", words.view)}`);
-  const off = (words.also ?? "").split(",").filter((name) => document.querySelector(`[name=also][value="${CSS.escape(name)}"]:disabled`));
-  return [...lost, ...off.map((name) => `${label("also", name)} beside the view`)];
+  const { state } = store;
+  const label = (/** @type {string} */ name, /** @type {string} */ value) => named(name).find((one) => one.value === value)?.parentElement?.textContent.trim() ?? value;
+  const lists = /** @type {const} */ ({ field: "field", "surface-colour": "colours of", vector: "vector", time: "time step" });
+  const lost = Object.entries(lists).flatMap(([id, what]) => (words[id] && String(state[/** @type {keyof typeof lists} */ (id)]) !== words[id] ? [`${what} ${words[id]}`] : []));
+  if (words.view !== state.view && named("mode").some(({ value }) => value === words.view)) lost.push(`view ${label("mode", words.view)}`);
+  const also = (words.also ?? "").split(",").filter((name) => named("also").some(({ value }) => value === name) && !state.also.includes(name));
+  return [...lost, ...also.map((name) => `${label("also", name)} beside the view`)];
 }
 
-/** Says what the volume does not have, and what means nothing. @param {string[]} lost @param {string[]} ignored */
-function tell(lost, ignored) {
-  const said = lost.length > 0 ? [`Left out, since this volume does not have it: ${lost.join(", ")}`] : [];
-  if (ignored.length > 0) said.push(`Ignored in the address, for it means nothing: ${ignored.join(", ")}`);
-  if (said.length > 0) note(said.join(". "));
-}
-
-/** A volume has arrived: shows it with these words, or as it is by default; says what of them it does not have. @param {Words} words */
-export function arriveWith(words) {
-  home = page.viewer.state.camera;
+/** A volume has arrived: takes the words as far as they mean something there. @param {Words} words @returns {{ lost: string[], ignored: string[] }} */
+export function showFitting(words) {
   const [kept, lost] = fitting(words);
   const ignored = show(kept);
-  lost.push(...untaken(words));
-  tell(lost, ignored);
-  // What is changed first can be undone, too, however soon.
-  if (now === undefined) save();
-  // The address names the volume even if all events of its camera came before it was open.
-  else changed();
+  return { lost: [...lost, ...untaken(words)], ignored };
 }
 
-/** Shows a state of the volume that is open; gives what of it means nothing. @param {Words} words */
-function show(words) {
-  const { transfer, ...others } = entries;
-  const ignored = Object.keys(words).filter((name) => name !== "url" && !entries[name]);
-  for (const [name, { set }] of Object.entries(others)) if (set(words[name] ?? "") === false) ignored.push(name);
-  page.overlay.showsAxes = $("axes").checked;
-  chooseField();
-  // The step of a transfer function is at the isovalue of the field.
-  transfer.set(words.transfer ?? "");
-  applyMode();
-  applyRegion();
-  // Draws, too.
-  applyTheme();
-  applyFrameTime();
-  applyRefineBy();
-  return ignored.map((name) => `${name}=${words[name]}`);
-}
-
-/** Shows a state: opens its volume if that is another one. @param {Words} words */
-export function restore(words) {
-  const { url = "" } = words;
-  if (url !== sourceWords() || !demo.info) return open(url, words);
-  tell([], show(words));
-}
-
-/** States before this one, and those that were undone. */
-const [past, future] = [/** @type {string[]} */ ([]), /** @type {string[]} */ ([])];
-/** @type {string | undefined} */
-let now;
-let timer;
-
-/** What belongs to the next state and has not ended. @type {Set<Promise<void>>} */
-const pending = new Set();
-/** Whether a pointer is pressed: what it drags is one step, however long it rests on the way. */
-let isPressed = false;
-
-/** Takes what `work` does into the next state, however late the viewer answers. */
-export function hold(work) {
-  const ended = work
-    .catch((error) => {
-      if (error?.code !== "freed") console.warn(error);
-    })
-    .then(() => {
-      pending.delete(ended);
-      changed();
-    });
-  pending.add(ended);
-}
-
-/** Something may have changed: writes the state when it rests. */
-export function changed() {
-  clearTimeout(timer);
-  timer = setTimeout(save, QUIET);
-}
-
-/** Writes the state into the address, and remembers the one before. */
-export function save() {
-  clearTimeout(timer);
-  if (!demo.info || isPlaying() || isPressed || pending.size > 0) return;
-  const words = written(stateNow());
-  if (words === now) return;
-  if (now !== undefined) past.push(now);
-  if (past.length > MOST) past.shift();
-  future.length = 0;
-  set(words);
-}
-
-function set(words) {
-  now = words;
-  $("undo").disabled = past.length === 0;
-  $("redo").disabled = future.length === 0;
-  // Without a hash, the address of the page as it is.
-  history.replaceState(null, "", words ? `#${words}` : `${location.pathname}${location.search}`);
-}
-
-async function step(from, to) {
-  await Promise.all(pending);
-  if (isPressed) return;
-  save();
-  if (from.length === 0) return;
-  to.push(now);
-  const words = from.pop();
-  set(words);
-  restore(read(words));
-}
-
-export const undo = () => step(past, future);
-export const redo = () => step(future, past);
-
-/** Shows the volume as it is by default. */
-export function reset() {
-  const { url } = stateNow();
-  restore(url === undefined ? {} : { url });
-  changed();
-}
-
-export function attachState(viewer) {
-  entries = makeEntries();
-  viewer.addEventListener("camera", cameraMoved);
-  for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) {
-    document.addEventListener(name, (event) => (isPressed = /** @type {PointerEvent} */ (event).buttons !== 0), { capture: true });
+/** Binds the controls that have values of their own. */
+export function attachState() {
+  for (const { id, element } of bound) {
+    element.addEventListener("input", () => store.change({ [id]: taken(element) }));
+    store.subscribe([id], () => put(element, store.state[id]));
   }
-  for (const name of ["input", "change", "click", "keyup", "pointerup", "pointercancel"]) document.addEventListener(name, changed);
-  window.addEventListener("hashchange", () => restore(read(location.hash)));
-  $("undo").addEventListener("click", undo);
-  $("redo").addEventListener("click", redo);
-  $("reset").addEventListener("click", reset);
 }

@@ -1,7 +1,7 @@
 /** Light or dark: of the page, and of the picture where that follows the page. */
 
 import { $ } from "./dom.js";
-import { draw } from "./scene.js";
+import { store } from "./state.js";
 
 const KEY = "tetralod-theme";
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
@@ -9,30 +9,30 @@ const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 /** Chosen by hand, or nothing where the system decides. @type {string | undefined} */
 let chosen;
 
-const isDark = () => (chosen ? chosen === "dark" : prefersDark.matches);
-
-/** The background of the picture. @returns {"dark" | "light" | "transparent"} */
+/** The background of the picture. */
 export function background() {
-  const { value } = $("background");
-  return value === "page" ? (isDark() ? "dark" : "light") : value;
+  const { background, dark } = store.state;
+  return /** @type {"dark" | "light" | "transparent"} */ (background === "page" ? (dark ? "dark" : "light") : background);
 }
 
-/** Shows what is chosen; the picture follows. */
-export function applyTheme() {
-  document.documentElement.style.colorScheme = chosen ?? "";
-  $("stage").dataset.background = background();
-  draw();
-}
+/** Takes what is chosen. */
+const apply = () => store.change({ dark: chosen ? chosen === "dark" : prefersDark.matches });
 
 /** The other of the two. */
 export function switchTheme() {
-  chosen = isDark() ? "light" : "dark";
+  chosen = store.state.dark ? "light" : "dark";
   try {
     localStorage.setItem(KEY, chosen);
   } catch {
     // Then it is kept for this visit.
   }
-  applyTheme();
+  apply();
+  showTheme();
+}
+
+function showTheme() {
+  document.documentElement.style.colorScheme = chosen ?? "";
+  $("stage").dataset.background = background();
 }
 
 export function attachTheme() {
@@ -41,8 +41,9 @@ export function attachTheme() {
   } catch {
     // The system decides.
   }
-  prefersDark.addEventListener("change", applyTheme);
+  prefersDark.addEventListener("change", apply);
   $("theme").addEventListener("click", switchTheme);
-  $("background").addEventListener("input", applyTheme);
-  applyTheme();
+  store.subscribe(["background", "dark"], showTheme);
+  apply();
+  showTheme();
 }

@@ -3,7 +3,7 @@
  * keeps it in the browser. Until then there is a drawing.
  */
 
-import { demo, page } from "./page.js";
+import { demo, viewer } from "./page.js";
 
 const KEY = "tetralod-picture ";
 /** Twice the size that the gallery shows. */
@@ -14,7 +14,7 @@ const REST = 1500;
 /** A drawing for what has no picture: the hue tells volumes apart. @param {string} words that it is for */
 function drawing(words) {
   const hue = [...words].reduce((sum, letter) => (sum * 31 + letter.charCodeAt(0)) % 360, 7);
-  const face = (corners, light) => `<path d="M${corners}Z" fill="hsl(${hue} 42% ${light}%)"/>`;
+  const face = (/** @type {string} */ corners, /** @type {number} */ light) => `<path d="M${corners}Z" fill="hsl(${hue} 42% ${light}%)"/>`;
   const shapes = face("240 52 134 224 222 248", 60) + face("240 52 222 248 346 216", 42);
   const lines = `<path d="M187 138 231 150 178 236ZM231 150 293 134 284 232Z" fill="none" stroke="hsl(${hue} 30% 20%)" stroke-width="1.5"/>`;
   const ground = `<rect width="480" height="300" fill="hsl(${hue} 22% 13%)"/>`;
@@ -22,7 +22,7 @@ function drawing(words) {
   return `data:image/svg+xml,${encodeURIComponent(svg)}`;
 }
 
-/** The picture that was taken of a volume. @returns {string | undefined} */
+/** The picture that was taken of a volume. @param {import("./gallery.js").Listed} volume @returns {string | undefined} */
 export function taken({ url, bytes }) {
   try {
     return localStorage.getItem(`${KEY}${url} ${bytes}`) ?? undefined;
@@ -44,13 +44,14 @@ export async function takePicture(volume) {
   const { info } = demo;
   await new Promise((resolve) => setTimeout(resolve, REST));
   if (info !== demo.info || demo.state !== "complete") return false;
-  const image = await createImageBitmap(await page.viewer.screenshot({ ...SIZE, background: "dark" }));
+  const image = await createImageBitmap(await viewer().screenshot({ ...SIZE, background: "dark" }));
   const canvas = new OffscreenCanvas(SIZE.width, SIZE.height);
-  canvas.getContext("2d").drawImage(image, 0, 0);
+  canvas.getContext("2d")?.drawImage(image, 0, 0);
   const blob = await canvas.convertToBlob({ type: "image/webp", quality: 0.8 });
+  /** @type {string} */
   const text = await new Promise((resolve, reject) => {
     const reader = new FileReader();
-    Object.assign(reader, { onload: () => resolve(reader.result), onerror: () => reject(reader.error) });
+    Object.assign(reader, { onload: () => resolve(String(reader.result)), onerror: () => reject(reader.error) });
     reader.readAsDataURL(blob);
   });
   try {

@@ -9,10 +9,13 @@
  *   origin: number[], offset: number, scale: number }} Triangles colours are three numbers a vertex: linear light, 0 to 1
  */
 
+/** Fields as one array of a file, so many numbers for each vertex. @typedef {{ name: string, size: number, values: Numbers, field: Field }} FieldArray */
+
 const TETRAHEDRON = 10;
 
 /** Names without what has a meaning in the formats, each once. @param {string[]} names @param {string[]} [taken] those that are in use */
 function plain(names, taken = []) {
+  /** @type {string[]} */
   const found = [];
   for (const name of names) {
     const base = name.replaceAll(/\W/g, "_");
@@ -24,12 +27,12 @@ function plain(names, taken = []) {
 }
 
 /** Text for an attribute of XML. */
-const escaped = (text) => text.replaceAll(/[<>&"']/g, (c) => `&#${c.codePointAt(0)};`).replaceAll(/\p{Cc}/gu, " ");
+const escaped = (/** @type {string} */ text) => text.replaceAll(/[<>&"']/g, (c) => `&#${c.codePointAt(0)};`).replaceAll(/\p{Cc}/gu, " ");
 
-/** Which of two words is that of the numbers of an array. */
+/** Which of two words is that of the numbers of an array. @param {ArrayLike<number>} array @param {string} single @param {string} double */
 const ofType = (array, single, double) => (array instanceof Float64Array ? double : single);
 
-/** What a component of so many is called. */
+/** What a component of so many is called. @param {number} count @param {number} c */
 function componentName(count, c) {
   if (count <= 3) return "xyz"[c];
   if (count === 6) return ["xx", "yy", "zz", "xy", "yz", "xz"][c];
@@ -39,10 +42,10 @@ function componentName(count, c) {
 /** How many of the first fields are the components of one vector, named as those of files are; else 1. @param {Field[]} fields */
 function componentsOf(fields) {
   const [{ vector, time }] = fields;
-  const isNext = (field, c) => vector && field.vector?.name === vector.name && field.vector.component === c && field.time === time;
+  const isNext = (/** @type {Field} */ field, /** @type {number} */ c) => vector && field.vector?.name === vector.name && field.vector.component === c && field.time === time;
   const end = fields.findIndex((field, c) => !isNext(field, c));
   const count = end < 0 ? fields.length : end;
-  const isNamed = ({ name }, c) => name === `${vector.name}_${componentName(count, c)}`;
+  const isNamed = (/** @type {Field} */ { name }, /** @type {number} */ c) => name === `${vector?.name}_${componentName(count, c)}`;
   return count > 1 && fields.slice(0, count).every(isNamed) ? count : 1;
 }
 
@@ -71,13 +74,13 @@ function interleaved(fields) {
  * @param {Field[]} fields
  */
 function arraysOf(fields) {
-  /** @type {{ name: string, size: number, values: Numbers, field: Field }[]} */
+  /** @type {FieldArray[]} */
   const arrays = [];
   for (let i = 0, size = 1; i < fields.length; i += size) {
     const field = fields[i];
     size = componentsOf(fields.slice(i));
     const { vector, time } = field;
-    const isOf = (array) => array.size > 1 && array.field.vector.name === vector.name && array.field.time === time;
+    const isOf = (/** @type {FieldArray} */ array) => array.size > 1 && array.field.vector?.name === vector?.name && array.field.time === time;
     if (vector && vector.component === undefined && arrays.some(isOf)) continue;
     const name = nameAtTime(fields, field, size > 1 ? vector?.name : undefined);
     arrays.push({ name, size, values: interleaved(fields.slice(i, i + size)), field });
@@ -85,7 +88,7 @@ function arraysOf(fields) {
   return arrays;
 }
 
-/** The one of the arrays that is the field of this number, unless that is part of a vector. */
+/** The one of the arrays that is the field of this number, unless that is part of a vector. @param {FieldArray[]} arrays @param {number} number */
 const arrayOf = (arrays, number) => arrays.find(({ size, field }) => size === 1 && field.index === number);
 
 /**
@@ -95,8 +98,10 @@ const arrayOf = (arrays, number) => arrays.find(({ size, field }) => size === 1 
  */
 export function vtu({ positions, tets, fields }, shown) {
   const [points, cells] = [positions.length / 3, tets.length / 4];
+  /** @type {ArrayBufferView[]} */
   const appended = [];
   let offset = 0;
+  /** @param {Numbers | Uint32Array | Uint8Array} data @param {string} name */
   const array = (data, name, size = 1, unit = "") => {
     const type = data.constructor.name.replace("Array", "").replace("Uint", "UInt");
     const element = `<DataArray type="${type}" Name="${escaped(name)}" NumberOfComponents="${size}" format="appended" offset="${offset}"`;
@@ -122,9 +127,9 @@ export function vtu({ positions, tets, fields }, shown) {
   return /** @type {BlobPart[]} */ ([head, ...appended, "</AppendedData></VTKFile>\n"]);
 }
 
-/** The same numbers, the highest byte first. */
+/** The same numbers, the highest byte first. @param {Numbers | Uint32Array} array */
 function swapped(array) {
-  const bytes = new Uint8Array(array.buffer.slice(array.byteOffset, array.byteOffset + array.byteLength));
+  const bytes = Uint8Array.from(new Uint8Array(array.buffer, array.byteOffset, array.byteLength));
   const size = array.BYTES_PER_ELEMENT;
   for (let i = 0; i < bytes.length; i += size) bytes.subarray(i, i + size).reverse();
   return bytes;
@@ -148,7 +153,7 @@ export function vtk({ positions, tets, fields }, shown) {
   const arrays = all.map((array, i) => ({ ...array, name: names[i] }));
   const scalars = arrayOf(arrays, shown);
   const others = arrays.filter((array) => array !== scalars);
-  const word = (values) => ofType(values, "float", "double");
+  const word = (/** @type {Numbers} */ values) => ofType(values, "float", "double");
   /** @type {BlobPart[]} */
   const data = [];
   if (scalars) data.push(`\nSCALARS ${scalars.name} ${word(scalars.values)} 1\nLOOKUP_TABLE default\n`, swapped(scalars.values));
@@ -221,7 +226,7 @@ export function ply({ positions, normals, fields, indices }) {
   return [head.join("\n"), vertices, faces];
 }
 
-/** The smallest and the largest of each coordinate. */
+/** The smallest and the largest of each coordinate. @param {Float32Array} positions */
 function bounds(positions) {
   const [min, max] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
   positions.forEach((x, i) => {
@@ -274,7 +279,7 @@ export function glb({ positions, indices, values, normals, colours, origin, offs
 }
 
 /** The light that a channel of sRGB means, both 0 to 1. */
-const linear = (channel) => (channel <= 0.04045 ? channel / 12.92 : ((channel + 0.055) / 1.055) ** 2.4);
+const linear = (/** @type {number} */ channel) => (channel <= 0.04045 ? channel / 12.92 : ((channel + 0.055) / 1.055) ** 2.4);
 
 /**
  * The colours that values have on the scale of a legend, as linear light: what glTF has in `COLOR_0`.
@@ -283,7 +288,7 @@ const linear = (channel) => (channel <= 0.04045 ? channel / 12.92 : ((channel + 
  * @param {Pick<import("tetralod/viewer").Legend, "range" | "log" | "colours">} legend
  */
 export function coloursOf(values, { range, log, colours }) {
-  const even = (value) => (log ? Math.log(value) : value);
+  const even = (/** @type {number} */ value) => (log ? Math.log(value) : value);
   const [low, high] = range.map(even);
   const table = colours.map((colour) => [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16) / 255));
   const found = new Float32Array(3 * values.length);
@@ -300,6 +305,6 @@ export function coloursOf(values, { range, log, colours }) {
 
 /** Comma-separated values. Numbers that are missing are empty. @param {(string | number | undefined)[][]} rows @returns {BlobPart[]} */
 export function csv(rows) {
-  const cell = (value) => (typeof value === "string" ? (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value) : (value ?? ""));
+  const cell = (/** @type {string | number | undefined} */ value) => (typeof value === "string" ? (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value) : (value ?? ""));
   return [`${rows.map((row) => row.map(cell).join(",")).join("\n")}\n`];
 }

@@ -245,7 +245,10 @@ fn js() -> Result<()> {
     package::ensure_built(package::Profile::Tested)?;
     shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["lint", "--error-on-warnings"]))?;
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;
+    shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js/tsconfig.page.json"]))?;
     shell::run(&mut node_test("actions.test.js"))?;
+    shell::run(&mut node_test("layers.test.js"))?;
+    shell::run(&mut node_test("store.test.js"))?;
     shell::run(&mut node_test("pack.test.js"))?;
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("fit.test.js"))?;
@@ -360,7 +363,7 @@ fn e2e() -> Result<()> {
         println!("what needs no GPU, in Firefox");
         ["core", "ranges"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
     })?;
-    for name in ["e2e.test.js", "page.test.js", "drop.test.js"] {
+    for name in ["state.test.js", "e2e.test.js", "page.test.js", "drop.test.js"] {
         let mut command = node_test(name);
         shell::run(command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", &browser.chromium))?;
     }

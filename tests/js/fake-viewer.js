@@ -1,0 +1,82 @@
+// A viewer without a GPU, for tests of the page's own code: it has one small volume, and does at once what it is asked for.
+const component = (name, number) => ({ name, unit: "m/s", min: -1, max: 1, time: number, vector: { name: "velocity", component: "xyz".indexOf(name.at(-1)) } });
+const FIELDS = [0, 1, 2].flatMap((time) => [
+  { name: "pressure", unit: "Pa", min: 1 + time, max: 10 + time, time },
+  ...["velocity_x", "velocity_y", "velocity_z"].map((name) => component(name, time)),
+]);
+
+const VOLUMES = {
+  flow: { kind: "half-edge", vertices: 1000, tetrahedra: 5000, updates: 900, bounds: [0, 0, 0, 2, 4, 8], fields: FIELDS },
+  plain: { kind: "explicit", vertices: 300, tetrahedra: 1000, updates: 200, bounds: [-1, -1, -1, 1, 1, 1], fields: [{ name: "density", unit: "", min: -2, max: 6, time: undefined }] },
+};
+
+const HOME = { target: [1, 2, 4], distance: 20, yaw: -0.75, pitch: 0.12, projection: "perspective" };
+
+/** Where points are seen, whatever the camera. */
+const OVERLAY = {
+  axes: [],
+  scaleBar: { label: "1 m", length: 1, width: 0.1, everywhere: true },
+  rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  matrix: [1, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0, 0, -1, -1, 0, 1],
+};
+
+export class TetralodError extends Error {}
+export const absolute = (result) => result;
+
+export class Viewer extends EventTarget {
+  static async create() {
+    return new Viewer();
+  }
+
+  adapter = "none";
+  frameTime = 60;
+  info = undefined;
+  legend = undefined;
+  overlay = undefined;
+  state = {};
+  /** What the page has asked for. */
+  requests = [];
+
+  #tell(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+
+  #move(camera) {
+    this.state = { ...this.state, camera: { ...this.state.camera, ...camera } };
+    this.#tell("camera", this.state.camera);
+  }
+
+  async open(source) {
+    this.info = VOLUMES[/plain/.test(source.name ?? source) ? "plain" : "flow"];
+    this.state = { camera: HOME };
+    this.overlay = OVERLAY;
+    this.#tell("overlay", OVERLAY);
+    return { info: this.info, total: 1e6, finished: Promise.resolve() };
+  }
+
+  async refine(request) {
+    this.requests.push(request);
+    this.#tell("stats", { tetrahedra: 500, vertices: 100, applied: 50, refined: 5, coarsened: 0, milliseconds: 1, done: true, satisfied: true, relativeErrorBound: 0.01, bounds: [0.01], bytes: 1000 });
+  }
+
+  async set(changes) {
+    this.state = Object.fromEntries(Object.entries({ ...this.state, ...changes }).filter(([, value]) => value !== null));
+    if (changes.camera) this.#tell("camera", changes.camera);
+    this.#tell("frame", { ready: true, triangles: 10, uploaded: 10, gpuBytes: 10, milliseconds: 1, bytes: 1000 });
+  }
+
+  home = async () => this.#move(HOME);
+  lookFrom = async (side) => this.#move({ yaw: side.length });
+  orbit = async (right) => this.#move({ yaw: this.state.camera.yaw + right });
+  zoom = async (factor) => this.#move({ distance: this.state.camera.distance * factor });
+  reading = async (point) => ({ position: point, values: Object.fromEntries(this.info.fields.map(({ name }) => [name, 1])), tet: 0, size: 1, error: 0.01 });
+  pick = async (x, y) => this.reading([1 + x / 2, 2 + y / 2, 3]);
+  line = async () => ({ at: [0, 1], values: [1, 2] });
+  stats = async ({ fractions = [] }) => ({ histogram: [1, 2, 3], percentiles: fractions.map((part) => 1 + part) });
+  pickRegion = async () => -1;
+  pan = async () => {};
+  keep = async () => {};
+  freeze = async () => {};
+  settled = async () => {};
+  blockMap = async () => undefined;
+}

@@ -1,0 +1,71 @@
+/** What is open: an address, or a file of the user. */
+
+import { nameOf } from "./format.js";
+import { demo } from "./page.js";
+
+/** An address, or a file. @typedef {string | File} Source */
+
+const FILE = "file:";
+
+/** @type {Source | undefined} */
+let source;
+/** What was opened last, perhaps in vain: the button "Try again" opens it again. @type {Source | undefined} */
+let tried;
+/** What the page opens by itself. */
+let first = "";
+/** Files of the user, by their names: undo may come back to them. @type {Map<string, File>} */
+const files = new Map();
+/** What MT files were built of by the page: in words, and its bytes. @type {WeakMap<File, { format: string, bytes: number }>} */
+const origins = new WeakMap();
+
+/** Notes what the page has built of files of the user. @param {File} built @param {File[]} files */
+export function setOrigin(built, files) {
+  const data = files.find(({ name }) => !/\.json$/i.test(name)) ?? files[0];
+  const format = (data.name.split(".").pop() ?? "").toUpperCase();
+  origins.set(built, { format, bytes: files.reduce((sum, { size }) => sum + size, 0) });
+}
+
+/** What the volume was built of, if the page has built it. */
+export const originOf = () => (source instanceof File ? origins.get(source) : undefined);
+
+/** The name of the volume, for files that are made of it. */
+export const volumeName = () => (source ? nameOf(source).replace(/\.mt$/i, "") : "tetralod");
+
+/** Says what is open where no address says anything else. @param {string} url */
+export const setFirst = (url) => void (first = url);
+
+/** @param {Source | undefined} from */
+export const setSource = (from) => void (source = from);
+
+/** Notes what is being opened. @param {Source} from */
+export function setTried(from) {
+  source = tried = from;
+}
+
+export const openSource = () => source;
+export const triedSource = () => tried;
+
+/** Whether what was opened last comes from a server. */
+export const isRemote = () => !(tried instanceof File);
+
+/** Whether nothing has come of what was opened last. */
+export const isNew = () => tried !== source || !demo.info;
+
+/** What is open, as in the address of the page. */
+export function sourceWords() {
+  if (source instanceof File) return `${FILE}${source.name}`;
+  return source === first ? "" : (source ?? "");
+}
+
+/** The name of a file that is part of an address, if that is one of a file. @param {string} words */
+export const fileNameIn = (words) => (words.startsWith(FILE) ? words.slice(FILE.length) : undefined);
+
+/** What is meant: the words of an address, or a file itself; undefined for a file that is not here. @param {Source} wanted @returns {Source | undefined} */
+export function sourceOf(wanted) {
+  if (wanted instanceof File) {
+    files.set(wanted.name, wanted);
+    return wanted;
+  }
+  const name = fileNameIn(wanted);
+  return name === undefined ? wanted || first : files.get(name);
+}
