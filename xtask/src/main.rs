@@ -20,6 +20,7 @@ mod licences;
 mod package;
 mod paper;
 mod planted;
+mod public_api;
 mod random;
 mod release;
 mod serve;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::{browser, demo, docs, fixture, package, shell, workflows};
+use crate::{browser, demo, docs, fixture, package, public_api, shell, workflows};
 
 struct Step {
     name: &'static str,
@@ -48,7 +48,7 @@ const STEPS: [Step; 15] = [
     step("wasm", "the core and a WebGPU adapter in headless Chromium", &["compile"], wasm),
     step("js", "lints and types of all JavaScript, and the package in Node", &["compile", "package"], js),
     step("workflows", "building in parts, with a process killed", &["compile"], workflows::test),
-    step("doc", "documentation without broken links", &["compile"], doc),
+    step("doc", "documentation without broken links, and the public names of the crates", &["compile"], doc),
     step("consumer", "installing and type-checking the packed package", &["compile", "package"], consumer),
     step("site", "the documentation's site: its links, and that it needs no network", &["package"], site),
     step("pages", "the examples of README.md and docs/ in Node and Chromium", &["compile", "package"], pages),
@@ -182,7 +182,8 @@ fn lint_wasm() -> Result<()> {
 
 fn doc() -> Result<()> {
     let mut command = shell::cargo(["doc", "--lib", "--no-deps"]);
-    shell::run(command.args(shell::ALL).env("RUSTDOCFLAGS", "-D warnings"))
+    shell::run(command.args(shell::ALL).env("RUSTDOCFLAGS", "-D warnings"))?;
+    public_api::check()
 }
 
 /// All that needs no browser. The tests that compare the renderer with its twin on the CPU show their output: how far they are apart.
@@ -190,6 +191,8 @@ fn native() -> Result<()> {
     browser::vulkan_driver()?;
     // Tests of real data are ignored otherwise.
     let with_data = std::env::var_os("TETRALOD_DATA").map(|_| "--include-ignored");
+    let is_missing = with_data.is_none() && std::env::var_os("TETRALOD_NOTHING_MISSING").is_some();
+    ensure!(!is_missing, "TETRALOD_DATA names no folder with the data sets, and TETRALOD_NOTHING_MISSING is set");
     let mut command = shell::cargo(["test"]);
     shell::run(command.args(shell::ALL).args(["--", "--skip", "gpu_matches_cpu"]).args(with_data))?;
     let mut command = shell::cargo(["test", "--test", "view"]);
