@@ -246,7 +246,7 @@ pub struct Opened {
     pub session: Session,
     /// Of the file.
     pub bytes: u64,
-    /// Those that were read, each counted once.
+    /// Bytes that were read, each counted once.
     pub read: u64,
 }
 

@@ -130,7 +130,7 @@ struct FilePart {
 struct Memory {
     /// The compact structure of this MT.
     compact_bytes: u64,
-    /// The same MT as an explicit structure.
+    /// The explicit structure of the same MT.
     explicit_bytes: u64,
     /// The reference mesh alone, without and with adjacency.
     indexed_bytes: u64,

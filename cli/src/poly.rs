@@ -103,7 +103,7 @@ impl Amount {
         }
     }
 
-    /// The same for people.
+    /// The amounts for people: a line for each.
     pub fn rows(&self, target: &Target) -> Vec<(&'static str, String)> {
         let mut rows = vec![
             ("file", target.path.display().to_string()),

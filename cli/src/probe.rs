@@ -60,7 +60,7 @@ fn parse_line(text: &str) -> Result<[f64; 6], String> {
 struct Report {
     /// Points that were looked at, or ends of the parts of a line.
     points: usize,
-    /// Those that are outside.
+    /// Points outside of the mesh.
     outside: usize,
     /// The length of the line, and how much of it is inside, in model units.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -303,7 +303,7 @@ fn summary(opened: &Opened, number: usize, stats: &RefineStats, needs: &[NamedNe
 }
 
 impl Summary {
-    /// The same for people.
+    /// The summary for people: a line for each number.
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let bound = match (self.error_bound, self.relative_error_bound) {
             (Some(bound), Some(relative)) => {

@@ -96,7 +96,7 @@ impl Angles {
         self.base = Some(CellAngles::of(base.tets.iter().map(|tet| tet.map(at))));
     }
 
-    /// The same for people.
+    /// The angles for people: a line for each.
     pub fn rows(&self) -> impl Iterator<Item = (&'static str, String)> {
         let base = self.base.as_ref().map(|base| ("  base mesh", sentence(base)));
         [("smallest angles", sentence(&self.reference))].into_iter().chain(base)

@@ -18,7 +18,7 @@ pub enum Recipe {
     Edge,
     /// Greedy insertion from a box of six tetrahedra: the paper's way for its vertex-based MT.
     Insert,
-    /// The same with errors of the tetrahedra's own.
+    /// Insertion with errors of the tetrahedra's own.
     InsertOwn,
     /// Vertices removed, cheapest first, and the hole filled by Delaunay tetrahedra.
     Delaunay,

@@ -37,7 +37,7 @@ pub const VERTEX: PublishedMt = PublishedMt {
 
 /// Smallbucky.
 pub const VERTICES: u64 = 35_937;
-/// Its reference mesh.
+/// Tetrahedra of its reference mesh.
 pub const TETRAHEDRA: u64 = 194_620;
 pub const INDEXED_BYTES: u64 = 3_688_912;
 pub const ADJACENCY_BYTES: u64 = 6_802_832;

@@ -17,7 +17,7 @@ pub struct Row {
     pub stats: MtStats,
     /// Bits of all nodes that describe shapes; only vertex-based MTs have them.
     pub shape_bits: Option<u64>,
-    /// The same nodes in the paper's code; only of vertex-based MTs whose tetrahedra have no errors of their own.
+    /// Bits of these nodes in the paper's code; only of vertex-based MTs whose tetrahedra have no errors of their own.
     pub codes: Option<NodeCodes>,
     pub file_bytes: u64,
 }

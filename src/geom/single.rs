@@ -66,7 +66,7 @@ impl SinglePoints {
         Self { origin, unit: unit(size, USUAL_SIZES) }
     }
 
-    /// The same in model units.
+    /// How points are stored from the same origin in model units.
     #[must_use]
     pub fn in_model_units(self) -> Self {
         Self { unit: 1.0, ..self }

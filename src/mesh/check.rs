@@ -32,7 +32,7 @@ fn check_neighbors(mesh: &TetMesh) -> Result<Vec<[u32; 4]>, MeshError> {
     check_tets(mesh).map_err(|error| error.in_input(|tet| mesh.input.cells.cell_of(tet)))
 }
 
-/// The same, with the numbers of tetrahedra in errors.
+/// The neighbours of each tetrahedron of a mesh that is valid, with the numbers of tetrahedra in errors.
 fn check_tets(mesh: &TetMesh) -> Result<Vec<[u32; 4]>, MeshError> {
     check_arrays(mesh)?;
     let sides = Sides::new(&mesh.positions);

@@ -120,7 +120,7 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    /// The same of the input's cells, given the cell of each tetrahedron; cells are numbers of tetrahedra until then.
+    /// The error with cells of the input, given the cell of each tetrahedron; its cells are numbers of tetrahedra until then.
     pub(super) fn in_input(self, cell_of: impl Fn(u32) -> InputCell) -> Self {
         let cell = |tet: InputCell| cell_of(tet.number);
         match self {

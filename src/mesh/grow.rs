@@ -47,7 +47,7 @@ pub(crate) struct Candidate {
 /// The face whose other side is coded next, and what is around it.
 #[derive(Clone, Debug)]
 pub(crate) struct Gate {
-    /// Its vertices: the mesh is in front where they go round to the left.
+    /// The vertices of the face: the mesh is in front where they go round to the left.
     pub face: [u32; 3],
     candidates: [Candidate; 3],
     count: usize,

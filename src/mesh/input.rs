@@ -15,7 +15,7 @@ pub struct MeshInput {
     pub notes: Vec<Note>,
     /// Fields at points that nobody asked for, without values.
     pub other_fields: Vec<Field>,
-    /// The same of fields at cells.
+    /// Fields at cells that nobody asked for, without values.
     pub other_cell_fields: Vec<Field>,
     /// The files that it was read from.
     pub files: SourceFiles,
@@ -227,7 +227,7 @@ const TETRAHEDRON: &str = "tetrahedron";
 pub struct InputCell {
     /// The part of the input that it is in, if there are several.
     pub part: Option<String>,
-    /// Its number there, from 0.
+    /// The number of the cell there, from 0.
     pub number: u32,
     /// What cells of its type are called, where not all are tetrahedra.
     pub kind: Option<&'static str>,

@@ -6,7 +6,7 @@ use std::fmt;
 /// An array of values at the points of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GridArray {
-    /// Its name.
+    /// The name of the array.
     pub name: &'static str,
     /// Values of a point: 1, or 3 for a vector.
     pub components: usize,

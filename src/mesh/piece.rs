@@ -8,7 +8,7 @@ pub struct MeshPiece {
     /// The number in the whole of each of its points, all different. Points that no earlier piece has are numbered on from the points of
     /// those, in their order here.
     pub points: Vec<u32>,
-    /// Its points, the fields there, and its tetrahedra, by their numbers in the piece. Points of an earlier piece have the values that
+    /// Points of the piece, fields there, and tetrahedra, by their numbers in the piece. Points of an earlier piece have the values that
     /// they have there.
     pub mesh: TetMesh,
 }

@@ -48,7 +48,7 @@ impl Mt {
         Ok(())
     }
 
-    /// The same MT, complete, with `2^bits` updates in each page: the blocks of its file. Kinds without pages only note it for that.
+    /// The MT, complete, with `2^bits` updates in each page: the blocks of its file. Kinds without pages only note it for that.
     ///
     /// # Errors
     /// If an update is not here.

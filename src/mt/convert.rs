@@ -7,7 +7,7 @@ use super::{
 use crate::mt::replay::canonical;
 
 impl Mt {
-    /// The same updates as an MT of another kind, in as many blocks as that kind usually has: see [`Mt::in_pages`].
+    /// The updates as an MT of another kind, in as many blocks as that kind usually has: see [`Mt::in_pages`].
     ///
     /// # Errors
     /// If that kind cannot hold them.

@@ -35,7 +35,7 @@ pub struct MtStats {
     pub max_inserted: u32,
     /// What the compact MT really holds.
     pub compact_bytes: u64,
-    /// The same MT in the explicit structure [§3]: see [`ExplicitMt::paper_bytes`](super::ExplicitMt::paper_bytes).
+    /// The explicit structure [§3] of the same MT: see [`ExplicitMt::paper_bytes`](super::ExplicitMt::paper_bytes).
     pub explicit_bytes: u64,
     /// The reference mesh alone: positions, fields and four vertex indices for each tetrahedron.
     pub indexed_bytes: u64,

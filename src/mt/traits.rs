@@ -66,7 +66,7 @@ pub trait MultiTessellation {
     /// No update that is not here (yet) has a larger error; [`ErrorCode::ZERO`] if all are.
     fn to_come(&self) -> ErrorCode;
 
-    /// The same in one field, which may be less.
+    /// Bounds the errors in one field of all updates that are not here (yet); may be less than [`Self::to_come`].
     fn to_come_in(&self, _field: usize) -> ErrorCode {
         self.to_come()
     }

@@ -16,7 +16,7 @@ impl Errors {
         Self::with_capacity(fields, 0)
     }
 
-    /// The same with room for so many updates.
+    /// No errors yet, with room for those of so many updates.
     pub fn with_capacity(fields: usize, updates: usize) -> Self {
         let stride = if fields == 1 { 1 } else { fields + 1 };
         Self { stride, codes: Vec::with_capacity(stride * updates) }
@@ -42,7 +42,7 @@ impl Errors {
         self.codes[k * self.stride]
     }
 
-    /// Those of update `k`, field by field.
+    /// The errors of update `k`, field by field.
     #[inline]
     pub fn of(&self, k: usize) -> &[ErrorCode] {
         &self.codes[k * self.stride..][usize::from(self.stride > 1)..self.stride]

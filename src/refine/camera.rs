@@ -161,7 +161,7 @@ impl Camera {
         by_sides.max(self.depth_distance(pixels, other, other_pixels, frame))
     }
 
-    /// The same for the depth up to which errors look large.
+    /// How far the depths up to which errors look large are from each other, in the unit of [`Camera::distance`].
     fn depth_distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         match (&self.depth, &other.depth) {
             (Depth::Perspective { plane: a, pixels: p }, Depth::Perspective { plane: b, pixels: q }) => {

@@ -11,16 +11,16 @@ pub struct TetData<'a> {
     pub corners: &'a [[i32; 3]; 4],
     /// Levels of a field at its corners.
     pub levels: &'a dyn Fn(usize) -> [i32; 4],
-    /// Its error, the largest one of all fields: that of the update that removes it, or its own error.
+    /// The error of the tetrahedron, the largest one of all fields: that of the update that removes it, or its own error.
     pub error: ErrorCode,
-    /// The same for each field.
+    /// The error of the tetrahedron in each field.
     pub errors: &'a [ErrorCode],
-    /// That update.
+    /// The update that removes it.
     pub update: UpdateId,
 }
 
 impl TetData<'_> {
-    /// Its error in one field, or the largest one of all.
+    /// The error of the tetrahedron in one field, or the largest one of all.
     #[inline]
     pub fn error_of(&self, field: Option<usize>) -> ErrorCode {
         field.and_then(|f| self.errors.get(f)).copied().unwrap_or(self.error)
@@ -30,7 +30,7 @@ impl TetData<'_> {
 /// The result of a criterion for a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// Its error divided by the allowed error: above 1 the tetrahedron violates the request, and its remover has to be
+    /// The error of the tetrahedron divided by the allowed error: above 1 it violates the request, and its remover has to be
     /// applied. Under a budget, larger values come first.
     pub excess: f64,
     /// How far the criterion may move (see [`Criterion::distance`]) before the tetrahedron can begin or cease to violate it.
@@ -145,6 +145,7 @@ pub struct Tolerance {
 }
 
 /// The component of a plane.
+#[inline]
 pub(super) fn component_of(plane: Option<usize>) -> u8 {
     plane.map_or(ANY, |plane| PLANES + (plane % PLANE_COMPONENTS) as u8)
 }

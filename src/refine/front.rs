@@ -69,7 +69,7 @@ pub(super) struct Task<'a, M> {
 pub struct Outcome {
     /// Updates applied on the way.
     pub refined: u64,
-    /// Those of them that were applied only because another update depends on them.
+    /// Updates applied on the way only because another update depends on them.
     pub forced: u64,
     /// Updates undone on the way.
     pub coarsened: u64,

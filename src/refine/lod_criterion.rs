@@ -51,7 +51,7 @@ struct FieldAtom {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     field: usize,
-    /// The same, where there are others.
+    /// The field whose error widens the range; none if the MT has no other field.
     error_of: Option<usize>,
     low: f64,
     high: f64,

@@ -27,7 +27,7 @@ pub(super) struct TetErrors<'a> {
 }
 
 impl<'a> TetErrors<'a> {
-    /// Those of a tetrahedron that update `u` removes, given its quarterings.
+    /// The errors of a tetrahedron that update `u` removes, given its quarterings.
     #[inline]
     pub fn new(mt: &'a impl ApplyUpdates, u: UpdateId, quarterings: u8) -> Self {
         let (largest, errors, fall) = (mt.error(u), mt.errors(u), mt.own_fall(u));
@@ -38,7 +38,7 @@ impl<'a> TetErrors<'a> {
         Self { largest: own.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max), by_field: Cow::Owned(own) }
     }
 
-    /// Those of tetrahedron `t` of the mesh, which update `u` removes.
+    /// The errors of tetrahedron `t` of the mesh, which update `u` removes.
     #[inline]
     pub fn of(mt: &'a impl ApplyUpdates, mesh: &CurrentMesh, t: u32, u: UpdateId) -> Self {
         Self::new(mt, u, mt.quarterings(mesh, t))

@@ -84,9 +84,9 @@ pub enum Region {
     },
     /// A ball.
     Sphere {
-        /// Its centre.
+        /// The centre of the ball.
         centre: [f64; 3],
-        /// Its radius; not negative.
+        /// The radius of the ball; not negative.
         radius: f64,
     },
     /// All points with `normal · p <= offset`.

@@ -7,9 +7,9 @@ use crate::mt::{Applied, ApplyUpdates, CurrentMesh, MAX_QUARTERINGS, UpdateError
 
 /// The result of forcing an update.
 pub(super) enum Forced {
-    /// It is applied.
+    /// The update is applied.
     Applied,
-    /// It depends on an update that has not arrived. The others listed here have been applied.
+    /// The update depends on one that has not arrived. The others listed here have been applied.
     Awaits(UpdateId, Vec<UpdateId>),
 }
 

@@ -33,7 +33,7 @@ impl Rows {
         self.least_by(threshold).0
     }
 
-    /// The same, and if one function alone decides that it exceeds `threshold`, which.
+    /// What [`Self::least`] gives, and if one function alone decides that it exceeds `threshold`, which.
     #[inline]
     pub fn least_by(&self, threshold: f64) -> (f64, Option<usize>) {
         let rows = &self.values[..self.len];

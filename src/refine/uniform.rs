@@ -41,7 +41,7 @@ impl<'a> NeededUpdates<'a> {
 /// The updates that stay applied in a sweep that undoes others.
 struct Staying<'a> {
     needed: NeededUpdates<'a>,
-    /// Those on which such updates depend, as far as they were found; none where errors are monotone.
+    /// Updates on which needed ones depend, as far as they were found; none where errors are monotone.
     others: BitSet,
 }
 

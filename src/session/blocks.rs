@@ -49,11 +49,11 @@ pub struct MappedBlock {
 /// What a session has of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BlockState {
-    /// It is not here.
+    /// The block is not here.
     Missing,
-    /// It is here.
+    /// The block is here.
     Here,
-    /// It is here, and the mesh has some of its updates.
+    /// The block is here, and the mesh has some of its updates.
     InUse,
 }
 

@@ -471,7 +471,7 @@ fn floor(info: &MtInfo, request: &Request) -> f64 {
     request.needs.iter().fold(0.0, |most, need| most.max(need_floor(info, need)))
 }
 
-/// The same for one need; views and transfer functions ask for other things than an error of a field.
+/// What the lattices round off of the field of one need. Views and transfer functions ask for other things than an error of a field.
 fn need_floor(info: &MtInfo, need: &Need) -> f64 {
     if matches!(need.part, Part::View(_) | Part::Transfer(_)) {
         return 0.0;

@@ -14,9 +14,9 @@ pub struct Reading {
     pub values: Vec<f64>,
     /// The tetrahedron that holds the point: an index into `tets` of [`Session::view`].
     pub tet: u32,
-    /// Its size, as [`TetQuantity::Size`](super::TetQuantity::Size).
+    /// The size of the tetrahedron, as [`TetQuantity::Size`](super::TetQuantity::Size).
     pub size: f64,
-    /// Its error, as [`TetQuantity::Error`](super::TetQuantity::Error): a fraction of the field's range.
+    /// The error of the tetrahedron, as [`TetQuantity::Error`](super::TetQuantity::Error): a fraction of the field's range.
     pub error: f64,
 }
 

@@ -72,7 +72,7 @@ pub enum Action {
     },
     /// Drop this request; it needs no further report.
     Cancel {
-        /// Its name.
+        /// The name of the request.
         id: u32,
     },
     /// Nothing to do before this time, unless something happens.

@@ -37,7 +37,7 @@ impl BoxEdge {
         [(self.axis + 1) % 3, (self.axis + 2) % 3]
     }
 
-    /// Its ends in model units: at the smaller and the larger coordinate.
+    /// The ends of the axis in model units: at the smaller and the larger coordinate.
     pub fn ends(self, bounds: &Bounds) -> [DVec3; 2] {
         let [mut from, mut to] = [bounds.min, bounds.max].map(DVec3::from);
         for (axis, is_upper) in self.others().into_iter().zip(self.upper) {
@@ -85,7 +85,7 @@ pub struct BoxAxis {
 /// A bar that says how large things are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScaleBar {
-    /// Its length in model units: a round number.
+    /// The length of the bar in model units: a round number.
     pub length: f64,
     /// The length as text.
     pub label: String,

@@ -23,7 +23,7 @@ impl BoxFace {
         Self { axis: 2, upper: true },
     ];
 
-    /// Its handle: the middle of the face.
+    /// The handle of the face: its middle.
     pub fn handle(self, bounds: &Bounds) -> DVec3 {
         let mut middle = (DVec3::from(bounds.min) + DVec3::from(bounds.max)) / 2.0;
         middle[self.axis] = if self.upper { bounds.max[self.axis] } else { bounds.min[self.axis] };

@@ -313,7 +313,7 @@ impl<'a> Probe<'a> {
         Some([0, 1, 2, 3].map(|i| self.side(FACES[i].map(|k| tet[k]), p)))
     }
 
-    /// The same for both ends of a segment.
+    /// On which side of each face the two ends of a segment are, as [`Self::sides`] has it.
     fn ends(&self, t: u32, from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 2]; 4]> {
         let tet = self.proper(t)?;
         Some([0, 1, 2, 3].map(|i| [from, to].map(|p| self.side(FACES[i].map(|k| tet[k]), p))))

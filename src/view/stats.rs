@@ -32,7 +32,7 @@ impl Default for FieldStats {
 }
 
 impl FieldStats {
-    /// Those of a mesh.
+    /// The statistics of a mesh.
     ///
     /// # Panics
     /// If the mesh names a point that it does not have.

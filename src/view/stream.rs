@@ -60,9 +60,9 @@ pub enum StreamEnd {
     Boundary,
     /// Nothing moves there.
     Stagnation,
-    /// It is as long as it may be.
+    /// The line is as long as it may be.
     Length,
-    /// It has as many steps as it may have.
+    /// The line has as many steps as it may have.
     Steps,
 }
 

@@ -184,7 +184,7 @@ impl Decimal {
         value.log10().floor() as i32 - 15
     }
 
-    /// The same number without zeros at its end.
+    /// The number without zeros at its end.
     fn shortened(self) -> Self {
         let mut one = [self];
         shorten(&mut one);
@@ -195,7 +195,7 @@ impl Decimal {
         scaled(self.digits as f64, self.exponent)
     }
 
-    /// Its integer multiples from `low` to `high`. There must be few.
+    /// The integer multiples of the number from `low` to `high`. There must be few.
     fn multiples_between(&self, low: f64, high: f64) -> Vec<Self> {
         // Casts saturate.
         let [first, last] = [(low / self.value()).floor(), (high / self.value()).ceil()].map(|i| i as i64);

@@ -112,7 +112,7 @@ impl Medium {
         Self { knots }
     }
 
-    /// The same medium where points and values are stored in single precision.
+    /// The medium where points and values are stored in single precision.
     #[must_use]
     pub fn relative_to(&self, points: &SinglePoints, values: &SingleValues) -> Self {
         let knot = |knot: &Knot| Knot {

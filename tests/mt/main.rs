@@ -7,6 +7,7 @@ mod explicit_updates;
 mod half_edge_pages;
 mod hand_made;
 mod hostile;
+mod imports;
 mod layers;
 mod rounding;
 #[path = "../support/mod.rs"]

@@ -15,7 +15,7 @@ const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "g
 pub struct Browser {
     /// The program to start.
     pub chromium: PathBuf,
-    /// Its WebDriver server.
+    /// The WebDriver server of the browser.
     pub driver: PathBuf,
 }
 

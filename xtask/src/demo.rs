@@ -117,7 +117,7 @@ fn make_volumes(tetralod: &Path, volumes: &[Volume], at_a_time: usize) -> Result
     })
 }
 
-/// The same, and the large volume.
+/// Makes the volumes of the demo, and the large one.
 pub fn make_all(tetralod: &Path) -> Result<()> {
     fs::create_dir_all(DATA)?;
     volumes::make(tetralod, &Volumes::read()?.large, &[])?;

@@ -42,7 +42,10 @@ pub fn check() -> Result<()> {
         "the public names are not those of {LIST}: gone {gone:?}, new {come:?}; if that is meant, run the step with \
          TETRALOD_UPDATE_API=1"
     );
-    ensure!(count <= MOST_NAMES, "{count} public names, more than {MOST_NAMES}: hide what no user of the crates needs");
+    ensure!(
+        count <= MOST_NAMES,
+        "{count} public names, more than {MOST_NAMES}: hide what no user of the crates needs"
+    );
     Ok(())
 }
 

@@ -192,7 +192,10 @@ fn native() -> Result<()> {
     // Tests of real data are ignored otherwise.
     let with_data = std::env::var_os("TETRALOD_DATA").map(|_| "--include-ignored");
     let is_missing = with_data.is_none() && std::env::var_os("TETRALOD_NOTHING_MISSING").is_some();
-    ensure!(!is_missing, "TETRALOD_DATA names no folder with the data sets, and TETRALOD_NOTHING_MISSING is set");
+    ensure!(
+        !is_missing,
+        "TETRALOD_DATA names no folder with the data sets, and TETRALOD_NOTHING_MISSING is set"
+    );
     let mut command = shell::cargo(["test"]);
     shell::run(command.args(shell::ALL).args(["--", "--skip", "gpu_matches_cpu"]).args(with_data))?;
     let mut command = shell::cargo(["test", "--test", "view"]);

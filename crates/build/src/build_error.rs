@@ -39,7 +39,7 @@ pub enum BuildError {
     /// The field has values at cells, not at points: see [`TetMesh::cells_to_points`](tetralod::mesh::TetMesh::cells_to_points).
     #[error("'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first")]
     CellField {
-        /// Its name.
+        /// The name of the field.
         name: String,
     },
     /// The mesh has no label of this name.
@@ -53,11 +53,11 @@ pub enum BuildError {
     /// A label is not an integer.
     #[error("'{name}' is no label: labels are integers, but number {at} is {value}")]
     Label {
-        /// Its name.
+        /// The name of the label.
         name: String,
         /// The cell or point.
         at: u32,
-        /// Its value.
+        /// The value that is no integer.
         value: f64,
     },
     /// There is no point where one is to be kept.
@@ -104,7 +104,7 @@ pub enum BuildError {
     /// An option is out of its range.
     #[error("option {name} must be {expected}")]
     Option {
-        /// Its name.
+        /// The name of the option.
         name: &'static str,
         /// The allowed values.
         expected: &'static str,

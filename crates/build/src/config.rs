@@ -32,8 +32,9 @@ pub struct BuildConfig {
     /// of the domain's diagonal; not negative. With 0.2, an error of 1 % allows the boundary to move by 0.2 % of the
     /// diagonal.
     pub displacement: f64,
-    /// The same in lengths of the shortest edge of the reference mesh at each place, where that is less; infinite where cells do not
-    /// matter. With 10, an error of 1 % allows the boundary to move by a tenth of such an edge.
+    /// The displacement that counts as much, in lengths of the shortest edge of the reference mesh at each place, where that is less than
+    /// [`BuildConfig::displacement`]; infinite where cells do not matter. With 10, an error of 1 % allows the boundary to move by a tenth of
+    /// such an edge.
     pub displacement_edges: f64,
     /// No update makes a cell with a smaller dihedral angle than so many degrees, 0 to 70, unless one of the cells that it takes the
     /// place of had a smaller one still. Not by [`Method::Insert`](crate::Method::Insert).

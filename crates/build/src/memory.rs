@@ -27,9 +27,9 @@ pub fn memory_needed_in_parts([points, tetrahedra, fields]: [u64; 3], parts: u32
     parting.max(after_parting([points, tetrahedra, fields], parts, at_a_time))
 }
 
-/// The same for a mesh that is parted [piece by piece](super::parts::Piecewise), of so many pieces, the largest of which has so many
-/// tetrahedra: the whole mesh is never in memory, but what is near the places at which pieces meet. Pieces are taken to be as long as they
-/// are wide; long ones meet at more places.
+/// [`memory_needed_in_parts`] of a mesh that is parted [piece by piece](crate::parts::Piecewise), of so many pieces, the largest of
+/// which has so many tetrahedra: the whole mesh is never in memory, but what is near the places at which pieces meet. Pieces are taken to
+/// be as long as they are wide; long ones meet at more places.
 pub fn memory_needed_in_pieces(
     counts: [u64; 3],
     [pieces, largest]: [u64; 2],

@@ -240,7 +240,7 @@ impl Construction {
         }
     }
 
-    /// The same for a purpose.
+    /// The construction for a purpose.
     ///
     /// # Errors
     /// [`BuildError::Combination`] if the method is not [`Method::Decimate`].
@@ -260,7 +260,7 @@ impl Construction {
         }
     }
 
-    /// The same with errors that tetrahedra have of their own.
+    /// The construction with errors that tetrahedra have of their own.
     ///
     /// # Errors
     /// [`BuildError::Combination`] if the method is not [`Method::Insert`].

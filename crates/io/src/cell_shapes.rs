@@ -42,7 +42,7 @@ const GRID_27: [u8; 27] =
     [0, 8, 1, 11, 24, 9, 3, 10, 2, 16, 22, 17, 20, 26, 21, 19, 23, 18, 4, 12, 5, 15, 25, 13, 7, 14, 6];
 /// The three triangles of a wedge with points at the middle of edges and quadrilaterals: corners, then middles.
 const LAYERS_18: [[u8; 6]; 3] = [[0, 1, 2, 6, 7, 8], [12, 13, 14, 15, 16, 17], [3, 4, 5, 9, 10, 11]];
-/// The same of a wedge without points at the middle of quadrilaterals and upright edges.
+/// The two triangles of a wedge without points at the middle of quadrilaterals and upright edges.
 const LAYERS_12: [[u8; 6]; 2] = [[0, 1, 2, 6, 7, 8], [3, 4, 5, 9, 10, 11]];
 /// The three quadrilaterals of a hexahedron with points at the middle of edges and upright faces: corners, then middles.
 const LAYERS_24: [[u8; 8]; 3] =
@@ -60,7 +60,7 @@ const MIDDLES_27: &[&[u8]] = &[
     &[4, 5, 6, 7],
     &[0, 1, 2, 3, 4, 5, 6, 7],
 ];
-/// The same of a pyramid of 19 points.
+/// The corners around the middles of the faces of a pyramid of 19 points, and of the whole.
 const MIDDLES_OF_19: &[&[u8]] =
     &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4], &[0, 1, 2, 3, 4]];
 /// The triangles that such a triangle is cut into.
@@ -264,7 +264,7 @@ impl Recipe {
     }
 }
 
-/// The same for a part: where the lowest vertex is on the fewest triangles.
+/// The tetrahedra at most that a part becomes: where the lowest vertex is on the fewest triangles.
 fn most_tets(part: &Part) -> usize {
     let triangles = |vertex: Option<u8>| -> usize {
         let faces = part.iter().filter(|face| vertex.is_none_or(|v| face.contains(&v)));

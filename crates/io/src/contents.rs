@@ -10,7 +10,7 @@ pub struct Survey {
     /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, or with the feature `formats`
     /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
     pub format: &'static str,
-    /// Its points.
+    /// The number of points.
     pub points: u64,
     /// The tetrahedra, at most, that its cells are or are split into.
     pub cells: u64,

@@ -103,7 +103,7 @@ impl<'a> Collector<'a> {
         Ok(true)
     }
 
-    /// The same for an array whose components have these names; `has_length` if it is a vector or tensor.
+    /// [`Self::claim`] for an array whose components have these names; `has_length` if it is a vector or tensor.
     pub fn claim_named(
         &mut self,
         name: &str,

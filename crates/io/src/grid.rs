@@ -90,7 +90,7 @@ impl Placement {
 #[derive(Debug, Default)]
 pub(super) struct GridValues {
     pub fields: Vec<Field>,
-    /// Those at cubes, one value a cube; without values where only names are asked for.
+    /// Fields at cubes, one value a cube; without values where only names are asked for.
     pub cubes: Vec<Field>,
     /// What hides points and cubes.
     pub ghosts: Ghosts,

@@ -439,7 +439,7 @@ enum Owner {
 #[derive(Default)]
 struct Body<'a> {
     positions: Option<Vec<[f64; 3]>>,
-    /// Those of a rectilinear grid, along each axis.
+    /// The coordinates of a rectilinear grid, along each axis.
     coordinates: [Vec<f64>; 3],
     /// Before version 5 counts and indices; since then indices alone.
     connectivity: Vec<i64>,

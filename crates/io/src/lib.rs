@@ -115,7 +115,7 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     expanded(read, options).at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
 }
 
-/// The same mesh with finite numbers at points that no cell uses, without cells that fold because they were cut into straight
+/// The mesh as callers get it: finite numbers at points that no cell uses, no cells that fold because they were cut into straight
 /// tetrahedra, and with all notes in words.
 fn settled(mut mesh: TetMesh) -> TetMesh {
     fields::settle_unused(&mut mesh);
@@ -124,7 +124,7 @@ fn settled(mut mesh: TetMesh) -> TetMesh {
     mesh
 }
 
-/// The same mesh with the points and tetrahedra of a grid.
+/// A mesh with the points and tetrahedra of its grid.
 fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadReason> {
     if let Some(grid) = mesh.grid.filter(|_| mesh.is_grid_alone()) {
         options.memory.take(grid::bytes(grid.dims))?;

@@ -27,7 +27,7 @@ impl MemoryLimit {
         Self(Some(Arc::new(Counted { most: bytes, taken: AtomicU64::new(0) })))
     }
 
-    /// The same limit, with nothing taken yet.
+    /// The limit with nothing taken yet.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn afresh(&self) -> Self {
         self.0.as_ref().map_or_else(Self::default, |counted| Self::of(counted.most))

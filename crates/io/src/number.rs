@@ -29,7 +29,7 @@ macro_rules! decoded {
     }};
 }
 
-/// The same for numbers of the type `$number`.
+/// Decodes `$bytes` as numbers of the type `$number`.
 macro_rules! all_decoded {
     ($number:expr, $bytes:expr, $big:expr, $into:ty) => {
         match $number {

@@ -99,7 +99,7 @@ pub(super) fn write_head(kind: &str, attributes: &str, body: &str, out: &mut imp
 /// An array of values at the points of a mesh, as files have it: a field, or the components of a vector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointArray<'a> {
-    /// Its name, with the time where there are several steps of it.
+    /// The name of the array, with the time where there are several steps of it.
     pub name: String,
     /// The field, or one for each component.
     pub components: &'a [Field],

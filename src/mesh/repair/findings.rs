@@ -22,7 +22,7 @@ pub struct MeshFindings {
     /// Faces of the boundary that lie on others, which are the two sides of an open seam: with the same three corners, or
     /// two with the same four corners as two others, which meet in the other diagonal.
     pub open_seam_faces: usize,
-    /// Those of the first kind, which [`RepairLevel::Weld`] closes.
+    /// Faces of open seams with the same three corners, which [`RepairLevel::Weld`] closes.
     pub weldable_faces: usize,
 }
 

@@ -1,5 +1,23 @@
 //! The star of a vertex that is to be split, with its link numbered locally; the part of a split that looks but does
 //! not change anything.
+//!
+//! A split puts v' and v'' in the place of the vertex c. The tetrahedra of its star go to either, by *sides*: 0 to v', 1 to v''. The faces
+//! at c between the two sides are the *fan*; behind each, a tetrahedron with v' and v'' fills the gap. With triangles instead of
+//! tetrahedra, where the fan is the edges c b and c d:
+//!
+//! ```text
+//!     a ─────── b                  a ─────── b
+//!     │ ╲  0  ╱ │                  │ ╲ 0  ╱╱ │        face opposite c   a b   a d   b e   d e
+//!     │   ╲ ╱   │        u+        │   v' ╱  │        side               0     0     1     1
+//!     │ 0  c  1 │      ─────▶      │ 0 │ ╲ 1 │        mask               bit 0 is that of a b, ...: 0b1100
+//!     │   ╱ ╲   │                  │  ╱ v''  │
+//!     │ ╱  1  ╲ │                  │ ╱╱ 1  ╲ │        new: v' v'' b and v' v'' d
+//!     d ─────── e                  d ─────── e
+//! ```
+//!
+//! A mask has the bits of the sides in canonical order: ascending by the sorted vertex numbers of the faces opposite c, here with a < b <
+//! d < e. So it is the same in every consistent set, whatever the slots are. What must hold: the mask has no bits beyond the star, the fan
+//! is one loop or one path ([`Ring::find_fan`]), and all tetrahedra are positive afterwards ([`Ring::is_positive`]).
 
 use crate::geom::orient3d;
 use crate::mesh::NONE;
@@ -130,7 +148,7 @@ impl Default for HalfStar {
 }
 
 impl HalfStar {
-    /// Those that were gathered.
+    /// The tetrahedra that were gathered.
     #[inline]
     pub fn tets(&self) -> &[u32] {
         &self.tets[..self.len.min(HALF_CAPACITY)]

@@ -221,7 +221,7 @@ impl EdgeMt {
         }
     }
 
-    /// The same MT, complete, in pages of another size.
+    /// The MT, complete, in pages of another size.
     ///
     /// # Errors
     /// If an update is not here.
@@ -364,7 +364,7 @@ impl EdgeMt {
         EdgeUpdate { level_residuals: self.level_residuals(u).collect(), ..self.update_without_levels(u) }
     }
 
-    /// The same but for the levels, which are left empty.
+    /// [`Self::update`] but for the levels, which are left empty.
     #[inline]
     pub(crate) fn update_without_levels(&self, u: UpdateId) -> EdgeUpdate<'_> {
         let words = self.words(u);

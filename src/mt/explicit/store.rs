@@ -403,7 +403,7 @@ impl MultiTessellation for ExplicitMt {
         &self.info
     }
 
-    /// Its tetrahedra are the first of [`ExplicitMt::tets`], in the same order.
+    /// The base mesh: its tetrahedra are the first of [`ExplicitMt::tets`], in the same order.
     fn base(&self) -> &BaseMesh {
         &self.base
     }

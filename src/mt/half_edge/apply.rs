@@ -133,7 +133,8 @@ impl HalfEdgeMt {
         parents.find(|&p| mesh.slot(self.vertex(p)).is_none()).ok_or(torn)
     }
 
-    /// Finds the star that the insertion makes, whose T_u has been collected.
+    /// Finds the star that the insertion makes, whose T_u has been collected; drawn at [`super::scratch`]. None if T_u is not what an
+    /// insertion removes.
     pub(super) fn find_star(&self, mesh: &mut CurrentMesh, scratch: &mut Scratch) -> Option<()> {
         let slot = scratch.link[0];
         mesh.number_slot(slot, 0);

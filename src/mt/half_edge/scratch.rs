@@ -1,4 +1,23 @@
 //! Scratch space for insertions and removals: T_u and the star that an insertion makes.
+//!
+//! Every tetrahedron of T_u has the near vertex n. In the star that the insertion of v makes, each of them has v in its place, and takes its
+//! slot; and behind each face of T_u that has n and does not go with the tetrahedron (that is no *inner* face), a tetrahedron with n and
+//! v fills the gap. With triangles instead of tetrahedra, where the edge n b is an inner face and n a and n c are not:
+//!
+//! ```text
+//!    T_u, around n            the star of v
+//!
+//!      a ───── b                a ───── b
+//!      │  0  ╱ │                │ ╲ 0 ╱ │          0, 1   take the slots of T_u: they have v instead of n
+//!      │   ╱   │      u+        │   v   │          2, 3   fill the gaps: they have n and v
+//!      │ ╱  1  │    ─────▶      │2 ╱ ╲ 1│          link   n, a, b, c: the vertices of Π_u; n is the first
+//!      n ───── c                │ ╱ 3 ╲ │
+//!                               n ───── c
+//! ```
+//!
+//! What must hold: no face that stays has tetrahedra of T_u on both sides; the gaps lie around the edge n v in one piece
+//! ([`Scratch::close_ring`]); and all tetrahedra of the star are positive ([`Scratch::is_positive`]). The removal of v undoes this: what
+//! has v and n goes, what has v alone gets n in its place.
 
 use crate::geom::{NARROW_BITS, det_i64, orient3d};
 use crate::mesh::FACES;
@@ -17,7 +36,7 @@ pub(in crate::mt) const NO_ENTRY: u8 = 0xFF;
 /// A tetrahedron of the star that an insertion makes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::mt) struct NewTet {
-    /// Its corners by index into the link, [`NEW`] for the new vertex; positive.
+    /// The corners by index into the link, [`NEW`] for the new vertex; positive.
     pub corners: [u8; 4],
     /// Across each face that has the new vertex, the tetrahedron of the star, [`NO_ENTRY`] at the boundary.
     pub across: [u8; 4],
@@ -119,20 +138,48 @@ impl Scratch {
         Some(place as u8)
     }
 
-    /// Joins the tetrahedra around the edge from the near to the new vertex. They must close up, or run from boundary to
-    /// boundary, in one piece.
+    /// Joins the tetrahedra that fill gaps. All have the edge from the near to the new vertex: they must close up around it, or run from
+    /// boundary to boundary, in one piece.
+    ///
+    /// ```text
+    ///   seen along that edge, +        each gap has two faces with the edge, each with one vertex of the link:
+    ///                                  for both there is an entry in `ends`, which are sorted by these vertices
+    ///       b            b
+    ///     1 │ 2        1 │ 2           closed   a0 a1 │ b1 b2 │ c2 c3 │ d0 d3     each vertex twice
+    ///   a ──+── c    a ──+── c         open     a1 │ b1 b2 │ c2                   but for two of them
+    ///     0 │ 3
+    ///       d
+    /// ```
+    ///
+    /// Two gaps with an entry at the same vertex meet in the face there. With three at a vertex, more than two gaps would meet. With one,
+    /// the face is of the boundary: there are none or two such ends. As every gap has two sides, the gaps then form circles, or one path
+    /// and circles; that all are met on the way from one to the next shows that it is a single circle, or the path alone.
     pub fn close_ring(&mut self) -> Option<()> {
         let gaps = self.ends.len() / 2;
         if gaps == 0 {
             return None;
         }
         self.ends.sort_unstable();
-        let (mut open, mut i) = (0, 0);
+        // From one end, or from anywhere, all must be met.
+        let start = match self.join_gaps()? {
+            (0, _) => parts(self.ends[0]).1,
+            (2, lone) => lone?,
+            _ => return None,
+        };
+        (self.met_from(start, gaps) == gaps).then_some(())
+    }
+
+    /// Joins the gaps that meet in a face, given the sorted ends. Returns how many ends are alone at their vertex, and the gap of the
+    /// first of them; none if three are at one.
+    #[inline]
+    fn join_gaps(&mut self) -> Option<(usize, Option<u8>)> {
+        let (mut alone, mut first, mut i) = (0, None, 0);
         while i < self.ends.len() {
             let (v, gap, corner) = parts(self.ends[i]);
             let next = self.ends.get(i + 1).map(|&end| parts(end)).filter(|next| next.0 == v);
             let Some((_, other, side)) = next else {
-                open += 1;
+                alone += 1;
+                first = first.or(Some(gap));
                 i += 1;
                 continue;
             };
@@ -143,24 +190,17 @@ impl Scratch {
             self.star[other as usize % MOST].across[side as usize & 3] = gap;
             i += 2;
         }
-        if open != 0 && open != 2 {
-            return None;
-        }
-        // From one end, or from anywhere, all must be met.
-        let first = parts(self.ends[0]).1;
-        let (mut met, mut from, mut at) = (1, NO_ENTRY, first);
-        if open == 2 {
-            let lone = |i: usize| {
-                let v = parts(self.ends[i]).0;
-                let end = |j: Option<usize>| j.and_then(|j| self.ends.get(j));
-                let same = |j: Option<usize>| end(j).is_some_and(|&end| parts(end).0 == v);
-                !same(i.checked_sub(1)) && !same(Some(i + 1))
-            };
-            at = parts(self.ends[(0..self.ends.len()).find(|&i| lone(i))?]).1;
-        }
-        let start = at;
-        loop {
+        Some((alone, first))
+    }
+
+    /// How many gaps are met from `start` on, each behind a face of the one before: once around, or to the end. No more than one above
+    /// `most` are counted.
+    #[inline]
+    fn met_from(&self, start: u8, most: usize) -> usize {
+        let (mut met, mut from, mut at) = (1, NO_ENTRY, start);
+        while met <= most {
             let NewTet { corners, across, own, .. } = self.star[at as usize % MOST];
+            // Opposite the new vertex is no gap, and opposite the near vertex (0) is what T_u left.
             let next = (0..4).filter(|&k| k != own as usize && corners[k] != 0).map(|k| across[k]);
             let Some(next) = next.filter(|&n| n != NO_ENTRY && n != from).min() else { break };
             if next == start {
@@ -168,11 +208,8 @@ impl Scratch {
             }
             (from, at) = (at, next);
             met += 1;
-            if met > gaps {
-                return None;
-            }
         }
-        (met == gaps).then_some(())
+        met
     }
 
     /// Hashes the labels of the star.

@@ -39,7 +39,7 @@ struct Choice {
     /// The weight before neighbours were looked at.
     first_weight: f64,
     remover: u32,
-    /// Its place among the forest children of its near vertex that come later.
+    /// The place of the remover among the forest children of its near vertex that come later.
     place: u32,
     /// The corner of the tetrahedron that is its near vertex.
     corner: u8,
@@ -285,7 +285,7 @@ impl Writer<'_> {
     }
 }
 
-/// Those of the children that come after `u`.
+/// The children that come after `u`.
 #[inline]
 fn later(children: &[ForestChild], u: UpdateId) -> &[ForestChild] {
     match (children.first(), children.last()) {

@@ -223,7 +223,7 @@ impl HalfEdgeMt {
         Ok(UpdateId(update))
     }
 
-    /// The same MT, complete, in pages of another size.
+    /// The MT, complete, in pages of another size.
     ///
     /// # Errors
     /// If an update is not here.

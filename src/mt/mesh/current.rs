@@ -105,7 +105,7 @@ pub struct CurrentMesh {
     pub(in crate::mt) free_tets: Vec<u32>,
     /// `epoch << MARK_BITS | index in the star` of the last star that each tetrahedron was in.
     pub(in crate::mt) marks: Vec<u32>,
-    /// The same for the vertices of a link.
+    /// `epoch << MARK_BITS | index in the link` of the last link that each vertex was in.
     pub(in crate::mt) vertex_marks: Vec<u32>,
     pub(in crate::mt) epoch: u32,
     /// What the kind of the MT keeps with its meshes.

@@ -23,7 +23,7 @@ impl Default for Star {
 /// Why a star was not gathered.
 #[derive(Debug)]
 pub(crate) enum Gather<T> {
-    /// It has more than [`GATHERED`] tetrahedra, none of which the caller wanted to stop at.
+    /// The star has more than [`GATHERED`] tetrahedra, none of which the caller wanted to stop at.
     TooLarge,
     /// The caller's look at a tetrahedron stopped it.
     Stopped(T),

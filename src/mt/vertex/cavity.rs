@@ -22,7 +22,7 @@ pub(in crate::mt) const SLOTS: usize = 256;
 /// A face of Π_u with what lies beyond.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::mt) struct Wall {
-    /// Its vertices by index into the link, in an order that makes a tetrahedron `(v, corners)` positive.
+    /// The vertices by index into the link, in an order that makes a tetrahedron `(v, corners)` positive.
     pub corners: [u8; 3],
     pub beyond: u32,
     /// Which neighbour of the one beyond lies on this side.

@@ -107,7 +107,7 @@ pub(in crate::mt) enum ApexCode {
     Vertex,
     /// So many ones as the place says, and a zero.
     Unary,
-    /// The same for half of it, and the last bit.
+    /// Half of the place in the way of [`ApexCode::Unary`], and its last bit.
     Halves,
     /// A zero for place 0; else a one, and the place less 1 in the way of [`ApexCode::Halves`].
     Later,

@@ -148,7 +148,7 @@ impl VertexMt {
         })
     }
 
-    /// The same MT, still without updates, with errors of tetrahedra: those of the base mesh are here, the nodes that are
+    /// The MT, still without updates, with errors of tetrahedra: those of the base mesh are here, the nodes that are
     /// pushed have the others. See [`quarterings`](crate::mt::ApplyUpdates::quarterings).
     ///
     /// # Errors

@@ -35,7 +35,7 @@ pub const MOST_TRIES: u32 = 20_000;
 #[derive(Clone, Copy, Debug)]
 pub(in crate::mt) struct Polyhedron<'a> {
     pub positions: &'a [[i32; 3]],
-    /// Its faces, turned and in canonical order.
+    /// The faces of Π_u, turned and in canonical order.
     pub faces: &'a [Face],
     /// The place of f_u among them.
     pub first: usize,
@@ -78,10 +78,10 @@ enum Is {
     GivenUp,
     /// The next tetrahedron is behind it.
     Entry,
-    /// It waits for the facet of a tetrahedron that is still to come, or has met it.
+    /// The facet waits for that of a tetrahedron that is still to come, or has met it.
     Open,
     Taken,
-    /// It has met that one, by its place in the list.
+    /// The facet has met another one, by its place in the list.
     Met(u16),
 }
 
@@ -111,7 +111,7 @@ fn edge(from: u8, to: u8) -> usize {
     (usize::from(from) << 6 | usize::from(to)) % (MAX_AROUND * MAX_AROUND)
 }
 
-/// The same face as the tetrahedron behind it sees it.
+/// The face as the tetrahedron behind it sees it.
 #[inline]
 fn from_behind([a, b, c]: Face) -> Face {
     [a, c, b]

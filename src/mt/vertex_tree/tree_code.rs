@@ -8,9 +8,18 @@
 //! - `11`: behind it is one that has been traversed.
 //!
 //! The paper leaves the order of the three facets open. Here it is that of the labels of the vertices opposite them, so that it
-//! is the same in every mesh. Three tetrahedra around an edge, with six faces of Π_u, two at each:
+//! is the same in every mesh. Three tetrahedra around an edge, with six faces of Π_u, two at each; first as seen along the edge, whose ends
+//! lie in front and behind at +, then as a tree:
 //!
 //! ```text
+//!           3                  A   the edge, 2 and 3; f_u is one of its two faces of Π_u
+//!         ╱ │ ╲                B   the edge, 3 and 4
+//!        ╱  │  ╲               C   the edge, 4 and 2
+//!       ╱ A │ B ╲
+//!      ╱  ╱ + ╲  ╲             A and B meet in the face between + and 3, B and C in that between
+//!      2 ╱  C  ╲ 4             + and 4, and C and A in that between + and 2
+//!        ───────
+//!
 //!   f_u
 //!    │
 //!    A ─ 0
@@ -77,11 +86,19 @@ pub(in crate::mt) struct TreeNode {
     /// The tetrahedron that it was entered from, and through which of its labelled facets. Of t_u both are 0.
     pub parent: u8,
     pub facet: u8,
-    /// Those that are reached from it are the next ones, up to here.
+    /// The end of the tetrahedra that are reached from it, which are the next ones.
     pub end: u8,
 }
 
 /// The spanning tree of T_u: its tetrahedra as they are entered.
+///
+/// Each comes after the one that it was entered from, and a subtree is a range: that of node `i` is `i .. nodes[i].end`.
+///
+/// ```text
+///   A ─▶ B ─▶ C           node     A   B   C   D
+///   └──▶ D                parent   -   A   B   A
+///                         end      4   3   3   4
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::mt) struct Tree {
     nodes: [TreeNode; MAX_REMOVED],

@@ -179,7 +179,7 @@ pub(super) fn unit(v: DVec3) -> Option<[f32; 3]> {
     unit_of_extreme(v)
 }
 
-/// The same for a vector whose square may leave the range of `f64`: it is divided by its largest component first.
+/// [`unit`] for a vector whose square may leave the range of `f64`: it is divided by its largest component first.
 #[cold]
 fn unit_of_extreme(v: DVec3) -> Option<[f32; 3]> {
     let v = v / v.to_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));

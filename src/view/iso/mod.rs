@@ -86,7 +86,7 @@ enum State {
     New,
     /// The last mesh had so many points and tetrahedra.
     Of(usize, usize),
-    /// The same, but the normals are of another kind.
+    /// A surface of the last mesh, but the normals are of another kind.
     Stale,
 }
 

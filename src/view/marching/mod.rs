@@ -240,7 +240,7 @@ impl Pieces {
         self.links.iter().flat_map(move |links| links.fan(v))
     }
 
-    /// The same in the order of an extraction.
+    /// The triangles at a vertex in the order of an extraction.
     pub fn ordered_fan(&self, v: u32) -> Vec<u32> {
         let key = |triangle: u32| u64::from(self.owners[triangle as usize]) << 32 | u64::from(triangle);
         let mut fan: Vec<u64> = self.fan(v).map(key).collect();

@@ -88,7 +88,7 @@ impl Polygon {
         if kept.len < 3 { Self::default() } else { kept }
     }
 
-    /// The same seen from the other side.
+    /// The polygon seen from the other side.
     pub fn reversed(mut self) -> Self {
         self.corners[..self.len].reverse();
         self

@@ -12,9 +12,9 @@ use tetralod::mt::{MAX_LINK, MAX_STAR};
 pub(crate) enum Refusal {
     /// The edge is not in the mesh any more.
     Gone,
-    /// It can never be collapsed.
+    /// The edge can never be collapsed.
     Never,
-    /// It may become possible when its neighbourhood changes.
+    /// The collapse may become possible when the neighbourhood of the edge changes.
     Blocked,
 }
 

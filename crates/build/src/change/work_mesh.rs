@@ -175,7 +175,7 @@ impl WorkMesh {
         self.star_from(self.incident[v as usize], v, most, seen, star)
     }
 
-    /// The same of those that are connected with `first`: where the boundary touches itself, there may be others.
+    /// The tetrahedra at a vertex that are connected with `first`: where the boundary touches itself, there may be others.
     pub fn star_from(
         &self,
         first: u32,

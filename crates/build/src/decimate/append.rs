@@ -11,7 +11,7 @@ use tetralod::mt::{
 pub(crate) struct Ordered<'a> {
     /// The vertex that each inserts.
     pub vertices: &'a [u32],
-    /// Its near vertex.
+    /// The near vertex of each update.
     pub near: &'a [u32],
     /// For each tetrahedron of the base mesh, by the builder's places, the update that removes it, [`NONE`] if none does, and which of
     /// its faces go with it: bit `i` is that of the face opposite the `i`-th vertex in ascending order.

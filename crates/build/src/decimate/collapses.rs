@@ -45,7 +45,7 @@ pub(crate) struct Collapses {
     /// Which of its faces were inside of what that collapse made: bit `i` is that of the face opposite the `i`-th vertex in ascending
     /// order.
     inner: Vec<u8>,
-    /// The same for the tetrahedra of the mesh.
+    /// The inner faces of the tetrahedra of the mesh.
     inner_now: Vec<u8>,
     /// What is left.
     base: Vec<[u32; 4]>,

@@ -102,7 +102,7 @@ pub(crate) fn decimate<R: Record + Default>(
     Ok(Decimated { record, quantized, info, interface_deviation })
 }
 
-/// The same for any record, compiled once.
+/// [`decimate`] for any record, compiled once.
 fn decimate_into(
     record: &mut dyn Record,
     mesh: &mut Cow<'_, TetMesh>,

@@ -17,7 +17,7 @@ pub(crate) struct Later {
     pub vertex: u32,
     /// The best of the neighbours that it could be moved to.
     pub end: u32,
-    /// Its neighbourhood was in this version.
+    /// The version that its neighbourhood was in.
     pub version: u32,
 }
 
@@ -25,10 +25,10 @@ pub(crate) struct Later {
 pub(crate) struct Rounds {
     level: u16,
     last_level: u16,
-    /// Those of the next round, each once.
+    /// The vertices of the next round, each once.
     waiting: Vec<u32>,
     waits: Vec<bool>,
-    /// Those of later levels. If their neighbourhood has changed since, they are waiting, too.
+    /// The vertices of later levels. If their neighbourhood has changed since, they are waiting, too.
     later: Vec<Vec<Later>>,
 }
 

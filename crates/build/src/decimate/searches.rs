@@ -17,7 +17,7 @@ pub(crate) type Removal = (u32, u32);
 pub(crate) struct Searches {
     /// One for each thread.
     all: Vec<Mutex<RemovalSearch>>,
-    /// Those of the removals that come next.
+    /// The searches of the removals that come next.
     pub ahead: Vec<RemovalSearch>,
 }
 

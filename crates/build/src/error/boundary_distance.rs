@@ -15,7 +15,7 @@ pub(crate) struct BoundaryDistance {
     corners: Vec<[u32; 3]>,
     /// The triangles at each vertex.
     around: Groups,
-    /// Those at the vertices with [`MANY`].
+    /// The fans of the vertices with more than [`MANY`] triangles.
     fans: HashMap<u32, TriangleFan>,
     /// How many triangles were compared with a point.
     #[cfg(test)]

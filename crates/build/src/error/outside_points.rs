@@ -159,7 +159,7 @@ impl Occupied {
         self.rows[row] |= 1 << z;
     }
 
-    /// Those between two cells, in order.
+    /// The cells between two cells, in order.
     fn between(&self, from: [usize; 3], to: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
         let layers =
             (from[0]..=to[0]).flat_map(move |x| bits(self.layers[x], from[1]..=to[1]).map(move |y| [x, y]));

@@ -45,7 +45,7 @@ impl Lists {
     }
 }
 
-/// The same where few tetrahedra have any points: those without take no memory.
+/// Lists of points of which few tetrahedra have any: those without take no memory.
 #[derive(Default)]
 pub(crate) struct SparseLists {
     first: HashMap<u32, u32>,

@@ -51,11 +51,11 @@ const MOST_SLOTS: usize = 1 << 29;
 /// A face of a zone's boundary.
 #[derive(Clone, Copy)]
 pub(crate) struct LinkFace {
-    /// Its vertices, counterclockwise from outside the zone.
+    /// The vertices of the face, counterclockwise from outside the zone.
     pub triangle: [u32; 3],
     /// The link's faces across the edges opposite them.
     pub around: [u32; 3],
-    /// The same in local numbers.
+    /// The vertices of the triangle in local numbers.
     numbers: [u32; 3],
     /// The tetrahedron outside, and which of its faces this is.
     outer: u32,
@@ -85,7 +85,7 @@ pub(crate) struct Triangulation {
     removed: Vec<([u32; 4], u32)>,
     /// The faces of the zone's boundary as `4 · slot + face` on the inner side.
     boundary: Vec<u32>,
-    /// The same faces, to be joined to the new vertex.
+    /// The boundary faces of the zone, to be joined to the new vertex.
     link: Vec<LinkFace>,
     /// Slots of the new star, ghosts included.
     star: Vec<u32>,
@@ -431,7 +431,7 @@ impl Triangulation {
         }
     }
 
-    /// The same for large links.
+    /// [`Self::connect_by_table`] for large links, with a sorted list in place of the table.
     fn connect_by_sorting(&mut self, v: u32) {
         let key = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
         self.sorted.clear();

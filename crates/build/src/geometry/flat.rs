@@ -43,7 +43,7 @@ pub(crate) struct Planes {
 }
 
 impl Planes {
-    /// Those of the boundary triangles around a vertex, if it must stay. Triangles are ordered as seen from outside.
+    /// The planes of the boundary triangles around a vertex, if it must stay. Triangles are ordered as seen from outside.
     pub fn of(triangles: impl Iterator<Item = [[i32; 3]; 3]> + Clone, feature: Feature) -> Option<Self> {
         let exact = Self::exact(triangles.clone(), feature).map(|planes| Self { planes, rounded: None });
         exact.or_else(|| {

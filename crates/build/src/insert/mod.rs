@@ -550,7 +550,7 @@ impl<'a> Greedy<'a> {
         self.heap.push(Candidate { key, slot, stamp });
     }
 
-    /// The same for the errors of the fields, where there are several.
+    /// Hands the errors of the fields at a cell over to a slot, where there are several fields.
     fn settle_fields(&mut self, cell: usize, slot: u32) {
         let (fields, at) = (self.weights.len(), slot as usize * self.weights.len());
         if fields == 1 {

@@ -252,7 +252,7 @@ enum Source {
 }
 
 impl Source {
-    /// Its number in the MT.
+    /// The number of the tetrahedron in the MT.
     fn number(self, base_ids: &[u32], ids: &[u32]) -> u32 {
         match self {
             Self::Base(place) => base_ids[place as usize],

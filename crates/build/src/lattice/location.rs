@@ -55,7 +55,7 @@ pub(crate) fn locations_of(
     Ok(points.map(|point| search.locate(point, first[point as usize])).collect())
 }
 
-/// The same of a piece of a mesh: the locations that the piece alone tells, and the other points that the lattice has moved. Those of
+/// The locations of points in a piece of a mesh: those that the piece alone tells, and the other points that the lattice moved. Those of
 /// `is_shared` belong to other pieces, too.
 pub(crate) fn locations_in_piece(
     tets: &[[u32; 4]],

@@ -196,7 +196,7 @@ fn cell_bits(grid: &Grid) -> Option<u32> {
     Some(u32::BITS - (cells - 1).leading_zeros())
 }
 
-/// The same for a mesh on a grid, if its cells are positive there.
+/// The fewest bits that hold the grid of a mesh exactly, if its cells are positive then.
 fn grid_bits(mesh: &TetMesh) -> Option<u32> {
     let bits = cell_bits(&mesh.grid?)?.max(1);
     fits(mesh, &on(mesh, bits)).then_some(bits)

@@ -221,7 +221,7 @@ pub(crate) fn lattices_alone(lattice: Lattice, fields: Vec<FieldInfo>, quantizat
     }
 }
 
-/// The same for a mesh whose cells are kept: errors are then measured at the input's own points.
+/// Quantizes a mesh whose cells are kept: errors are then measured at the input's own points.
 pub(crate) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
     let mut quantized = quantize(mesh, config)?;
     quantized.locations = location::locations(&mesh.tets, &quantized.positions, &quantized.places)?;

@@ -6,6 +6,19 @@
 //!
 //! Parts are cut along keys that never fall from parent to child: an update reaches at least as far as what depends on it,
 //! and its error is at least as large. What has the smaller key comes first, so the order extends the partial order.
+//!
+//! ```text
+//!   all updates
+//!   ├── reach begins left of x = 40        the parents of an update are in its part or in one above, never
+//!   │   ├── error above 1 %     block 0    below: they reach as far, and their errors are as large
+//!   │   └── the others          block 1
+//!   └── the others
+//!       ├── reach ends right of x = 90     block 2
+//!       └── the others                     block 3
+//! ```
+//!
+//! What must hold: a parent has a smaller number than its children, in whichever blocks the two are. Within a block the updates are then
+//! sorted by their near vertices, as far as this allows.
 
 use std::collections::BTreeSet;
 use tetralod::mt::ErrorCode;

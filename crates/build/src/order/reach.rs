@@ -1,4 +1,17 @@
 //! How far an update reaches: where all that depends on it lies.
+//!
+//! ```text
+//!    u ──▶ v ──▶ x         ┌───────────────────┐ reach of u: the box around its own star
+//!    └───▶ w               │  ┌─────┐     u    │ and the reaches of v and w
+//!                          │  │  w  │ ┌──────┐ │
+//!   an arrow leads to what │  └─────┘ │ v  x │ │
+//!   depends on an update   │          └──────┘ │
+//!                          └───────────────────┘
+//! ```
+//!
+//! What must hold: the reach of an update contains that of every update that depends on it. Updates are found as removals of vertices,
+//! finest first: each vertex keeps the box of its star and of the reaches of the removals that were there, which is the reach of its own
+//! removal.
 
 use crate::lattice::quantize::Quantized;
 
@@ -17,7 +30,7 @@ impl Default for Reach {
 }
 
 impl Reach {
-    /// Its lowest and its highest corner.
+    /// The lowest and the highest corner of the box.
     pub fn ends(&self) -> [[i32; 3]; 2] {
         [self.low, self.high]
     }

@@ -246,7 +246,7 @@ fn labels(mesh: &TetMesh, name: &str) -> Result<Vec<i64>, BuildError> {
     }
 }
 
-/// The same with the number of the cell in the input.
+/// The error with the number of the cell in the input.
 fn at_cell(error: BuildError, mesh: &TetMesh) -> BuildError {
     match error {
         BuildError::Label { name, at, value } => {

@@ -44,7 +44,7 @@ impl Restrictions {
         Ok(Self { feature, angle, ..Self::default() })
     }
 
-    /// The same with the region of each tetrahedron, and with points that stay; none of these if there are none.
+    /// The restrictions with the region of each tetrahedron, and with points that stay; none of these if there are none.
     pub fn with(self, regions: Vec<u32>, kept: Vec<bool>) -> Self {
         Self { regions: Regions::known(regions), kept, ..self }
     }

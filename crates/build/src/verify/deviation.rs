@@ -70,7 +70,7 @@ impl<'a> Deviation<'a> {
         Self::of(info, input, faces, vertices)
     }
 
-    /// The same of what the input has in some place, and the faces of its boundary there.
+    /// Prepares to compare with what the input has in some place, given the faces of its boundary there.
     pub fn of(
         info: &'a MtInfo,
         input: &'a TetMesh,
@@ -207,7 +207,7 @@ struct Place<'a> {
     tet: u32,
     /// The values there, as fractions of each field's range.
     shown: &'a [f64],
-    /// Its distance from the vertex, as the error that it counts as.
+    /// The distance of the place from the vertex, as the error that it counts as.
     displaced: f64,
 }
 

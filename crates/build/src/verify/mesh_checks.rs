@@ -32,7 +32,7 @@ pub struct Shape {
     surfaces: usize,
     /// Vertices − edges + faces − tetrahedra.
     euler: i64,
-    /// The same of the boundary.
+    /// The Euler number of the boundary.
     boundary_euler: i64,
     /// Vertices at which the boundary touches itself, ends of such edges, too.
     touching: usize,

@@ -19,7 +19,7 @@ pub struct Ask<'a> {
 /// Rounding errors of interpolated values, as fractions of the range.
 const VALUE_SLACK: f64 = 1e-9;
 
-/// The same of colours, which are kept with 24 bits.
+/// Rounding errors of colours, which are kept with 24 bits.
 const COLOUR_SLACK: f64 = 1e-6;
 
 impl<'a> Ask<'a> {

@@ -142,7 +142,7 @@ fn bounds(input: &TetMesh) -> Bounds {
 /// What an input has near a place.
 struct Near {
     mesh: TetMesh,
-    /// Those of its faces that are of the domain's boundary.
+    /// The faces of the mesh that are of the domain's boundary.
     faces: Vec<[u32; 3]>,
 }
 

@@ -105,7 +105,7 @@ struct Rounding {
 
 /// Units in the last place.
 const UNITS: f64 = 16.0;
-/// The same for computations, as a part of the model's size and of the field's range.
+/// Rounding errors of computations, as a part of the model's size and of the field's range.
 const RELATIVE: f64 = 1e-12;
 
 /// A mesh relative to the origins of its lattices.

@@ -9,9 +9,9 @@ use tetralod::mt::MtInfo;
 
 /// A boundary.
 pub struct Surface {
-    /// Its faces, in model units.
+    /// The faces of the boundary, in model units.
     pub triangles: TriangleGrid,
-    /// The same on the lattice, corners ascending, and the number of each: faces that two boundaries share need not be compared.
+    /// The faces on the lattice, corners ascending, and the number of each: faces that two boundaries share need not be compared.
     faces: Vec<Face>,
     numbers: HashMap<Face, u32>,
 }

@@ -71,7 +71,7 @@ impl<'a> Draft<'a> {
         self.read_at_points(name, components, integer, || Ok(values))
     }
 
-    /// The same with values that are read only if they are wanted.
+    /// Keeps an array with values at points, which are read only if they are wanted.
     pub fn read_at_points(
         &mut self,
         name: &str,
@@ -96,7 +96,7 @@ impl<'a> Draft<'a> {
         self.read_at_cells(name, components, integer, || Ok(values))
     }
 
-    /// The same with values that are read only if they are wanted.
+    /// Keeps an array with values at cells, which are read only if they are wanted.
     pub fn read_at_cells(
         &mut self,
         name: &str,

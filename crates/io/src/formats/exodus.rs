@@ -17,7 +17,7 @@ use tetralod::mesh::TetMesh;
 struct Reader<'a> {
     file: &'a NcFile,
     root: &'a NcGroup,
-    /// Those of the root, by their names: there may be one for each variable of each block.
+    /// The variables of the root, by their names: there may be one for each variable of each block.
     variables: HashMap<&'a str, &'a NcVariable>,
     step: u64,
 }

@@ -21,7 +21,7 @@ const HEXAHEDRON_27: &[usize] =
     &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22, 20];
 const WEDGE_15: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11];
 const WEDGE_18: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 15, 16, 17];
-/// Those of the triangles come before those of the quadrilaterals, and that of the whole before both.
+/// Nodes in the middle of triangles come before those of quadrilaterals, and that of the whole before both.
 const WEDGE_20: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 19, 17, 18];
 const WEDGE_21: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 20, 18, 19];
 const FIRST: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13];

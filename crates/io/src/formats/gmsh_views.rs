@@ -147,7 +147,7 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// Those of views with these heads. Where one has several steps without times that differ, their numbers are the times.
+    /// The steps of views with these heads. Where one has several steps without times that differ, their numbers are the times.
     pub fn of(heads: &[Head]) -> Self {
         // Of each view the numbers of its steps, with the bits of their times.
         type OfView = HashSet<(i64, Option<u64>)>;

@@ -16,7 +16,7 @@ const DIMENSION: i64 = 3;
 const VERTICES: i64 = 4;
 const BEZIER: i64 = 125;
 const END: i64 = 54;
-/// Those of the order of points of quadratic cells.
+/// Sections with the order of points of quadratic cells.
 const ORDERINGS: RangeInclusive<i64> = 133..=139;
 /// Sections that change neither places nor values: what has no volume, what belongs to it, and geometry.
 const HARMLESS: [RangeInclusive<i64>; 7] = [1..=7, 11..=25, 27..=29, 31..=32, 34..=45, 47..=61, 126..=132];

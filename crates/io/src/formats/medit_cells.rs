@@ -11,7 +11,7 @@ use crate::formats::draft::Draft;
 
 /// A kind of cells with a volume.
 pub(super) struct Kind {
-    /// Its keyword in text, and its number in binary.
+    /// The keyword of the cells in text, and its number in binary.
     pub name: &'static str,
     pub number: i64,
     /// VTK's type.
@@ -194,7 +194,7 @@ fn stated_order(places: &[Vec<u8>], table: &[i64]) -> Option<Vec<usize>> {
     places.iter().map(find).collect()
 }
 
-/// The same where the file states nothing: corners come first, and each other point of the file is, over all cells, nearest to
+/// [`stated_order`] where the file states nothing: corners come first, and each other point of the file is, over all cells, nearest to
 /// one place. None if that is not clear.
 pub(super) fn order_by_places(places: &[Vec<u8>], points: &[i64], coordinates: &[f64]) -> Option<Vec<usize>> {
     let corners = places.iter().filter(|place| place.len() == 1).count();

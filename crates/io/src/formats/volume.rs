@@ -248,7 +248,7 @@ pub(super) fn numbers<T: std::str::FromStr>(text: &str, key: &str) -> Result<Vec
     parsed.map_err(|_| ReadReason::Syntax(format!("{key} \"{text}\" is not a list of numbers")))
 }
 
-/// The same where there must be three.
+/// Three numbers that stand in one line of a header.
 pub(super) fn three<T: std::str::FromStr>(text: &str, key: &str) -> Result<[T; 3], ReadReason> {
     let list = numbers(text, key)?;
     list.try_into().map_err(|_| ReadReason::Syntax(format!("{key} \"{text}\" is not three numbers")))

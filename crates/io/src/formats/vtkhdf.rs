@@ -107,7 +107,7 @@ impl Reader<'_> {
         self.file.dataset(&format!("{ROOT}/{path}")).map_err(reason)
     }
 
-    /// The same where it need not be there.
+    /// A dataset that need not be there.
     fn dataset_if(&self, path: &str) -> Result<Option<Dataset>, ReadReason> {
         let (folder, name) = path.rsplit_once('/').unwrap_or(("", path));
         if !self.has_member(folder, name)? {

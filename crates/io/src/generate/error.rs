@@ -36,7 +36,7 @@ pub enum GenerateError {
         "{points} points are more than a mesh can number; write the grid (.vti), or choose a smaller size"
     )]
     Points {
-        /// Those of the grid.
+        /// The points of the grid.
         points: u64,
     },
     /// No orbital has these quantum numbers.

@@ -47,7 +47,7 @@ impl<T: Pod> GrowBuffer<T> {
         self.update_with(context, items.len(), changed, |range| Cow::Borrowed(&items[range]))
     }
 
-    /// The same of `len` items that are made for a range when they are written.
+    /// [`Self::update`] with `len` items that are made for a range when they are written.
     pub(super) fn update_with<'a>(
         &mut self,
         context: &Context,

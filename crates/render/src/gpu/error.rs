@@ -22,7 +22,7 @@ pub enum GpuError {
     TooLarge {
         /// What the buffer contains.
         what: &'static str,
-        /// Its size.
+        /// The size of the buffer.
         bytes: u64,
         /// The largest size that the device allows.
         limit: u64,

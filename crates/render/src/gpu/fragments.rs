@@ -26,7 +26,7 @@ pub(super) struct FragmentLists {
 enum Count {
     #[default]
     Idle,
-    /// It is being read.
+    /// The count is being read.
     Reading,
     Of(u32),
 }

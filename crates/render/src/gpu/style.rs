@@ -43,7 +43,7 @@ impl Default for EdgeLook {
 /// How a surface is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
-    /// Its colours.
+    /// The colours of the surface.
     pub colouring: Colouring,
     /// From 0 to 1; below 1, what is behind is seen through it.
     pub opacity: f32,

@@ -36,7 +36,7 @@ impl Default for Look {
 }
 
 impl Look {
-    /// The same look of a model whose points are stored in single precision.
+    /// The look of a model whose points are stored in single precision.
     pub(super) fn relative_to(&self, single: &SinglePoints) -> Self {
         let clips = self.clips.iter().map(|clip| clip.relative_to(single)).collect();
         let [strength, radius] = self.shade;

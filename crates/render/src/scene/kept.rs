@@ -16,7 +16,7 @@ pub(super) struct Kept {
     tets: Vec<[u32; 4]>,
     neighbors: Vec<[u32; 4]>,
     fields: Vec<Vec<f64>>,
-    /// Those of [`TetQuantity::ALL`].
+    /// The values of each of [`TetQuantity::ALL`].
     quantities: Vec<Vec<f64>>,
     pub objects: Objects,
 }

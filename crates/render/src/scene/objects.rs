@@ -63,7 +63,7 @@ impl Shown<'_> {
 
 /// What an update reads.
 pub(super) struct Input<'a> {
-    /// Its field colours things: that of the mesh, or the difference to another mesh.
+    /// The mesh whose field colours things: a field of its own, or the difference to another mesh.
     pub mesh: MeshView<'a>,
     /// The field of the mesh, which isosurfaces follow.
     pub field: &'a [f64],
