@@ -7,7 +7,6 @@
 use std::error::Error;
 use std::fs::{File, read};
 use std::io::Write;
-use std::ops::ControlFlow;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Camera;
 use tetralod::mesh::{Field, Grid, TetMesh};
@@ -78,7 +77,7 @@ fn distances() -> Result<Vec<u8>, Box<dyn Error>> {
     let mut mesh = TetMesh::from_grid(grid, Vec::new());
     let values = mesh.positions.iter().map(|p| p.iter().map(|x| x * x).sum::<f64>().sqrt()).collect();
     mesh.fields.push(Field::new("distance", values));
-    let built = build(&mesh, &BuildConfig::of(MtKind::HalfEdge), &mut |_| ControlFlow::Continue(()))?;
+    let built = build(&mesh, &BuildConfig::of(MtKind::HalfEdge))?;
     Ok(encode(&built.mt, &EncodeOptions::default())?)
 }
 

@@ -15,13 +15,13 @@
 //! use tetralod::session::Session;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // A mesh: generated here; `tetralod::io::read` reads one from a file. Meshes in files often need repair.
+//! // A mesh: generated here; `tetralod_io::read` reads one from a file. Meshes in files often need repair.
 //! let mesh = tetralod_io::generate::bucky(17)?;
 //! let (mesh, repaired) = tetralod::mesh::repair(mesh)?;
 //! assert!(repaired.is_empty());
 //!
 //! // Once, offline: its MT, and the bytes of the MT file.
-//! let built = build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()))?;
+//! let built = build(&mesh, &BuildConfig::default())?;
 //! let bytes = encode(&built.mt, &EncodeOptions::default())?;
 //!
 //! // Where it is used: bytes go in, in pieces of any size, and meshes come out before the last byte has arrived.

@@ -159,6 +159,6 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
 
 fn build(arguments: &Arguments, config: &BuildConfig, mesh: TetMesh) -> Result<BuildResult> {
     let result =
-        with_progress(&arguments.verbosity, |progress| tetralod_build::build_owned(mesh, config, progress))?;
+        with_progress(&arguments.verbosity, |progress| tetralod_build::build_with(mesh, config, progress))?;
     result.map_err(failed).with_context(|| arguments.options.name())
 }

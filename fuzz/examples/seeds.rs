@@ -63,13 +63,13 @@ fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     for (model, size) in [("bucky", 4), ("bucky", 6), ("sphere-flow", 5)] {
         let mesh = by_name(model, size)?;
         let all = BuildConfig { all_fields: true, ..BuildConfig::of(MtKind::Edge) };
-        let edge = build(&mesh, &all, &mut |_| ControlFlow::Continue(()))?.mt;
+        let edge = build(&mesh, &all)?.mt;
         put(&format!("edge-{model}-{size}"), &edge, 4)?;
         put(&format!("edge-{model}-{size}"), &edge, 8)?;
         put(&format!("explicit-{model}-{size}"), &edge.convert(MtKind::Explicit)?, 4)?;
         for kind in [MtKind::Vertex, MtKind::HalfEdge] {
             let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
-            if let Ok(built) = build(&mesh, &config, &mut |_| ControlFlow::Continue(())) {
+            if let Ok(built) = build(&mesh, &config) {
                 put(&format!("{}-{model}-{size}", kind.name()), &built.mt, 5)?;
             }
         }

@@ -1,7 +1,6 @@
 //! The data sets and their MTs, built as the paper built its own.
 
 use anyhow::{Context, Result};
-use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::mesh::{Field, Grid, TetMesh, repair};
 use tetralod::mt::{CurrentMesh, Mt, MtInfo, MultiTessellation};
@@ -63,7 +62,7 @@ pub struct Model {
 impl Model {
     pub fn build(recipe: Recipe, mesh: &TetMesh) -> Result<Self> {
         eprintln!("  {} ...", recipe.name());
-        let built = builder::build(mesh, &recipe.config(), &mut |_| ControlFlow::Continue(()));
+        let built = builder::build(mesh, &recipe.config());
         Ok(Self { recipe, mt: built.with_context(|| recipe.name())?.mt })
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::mesh::Field;
 use crate::mesh::MeshInput;
+use std::borrow::Cow;
 
 /// The regular grid that a mesh was split from; its points run x fastest, then y, then z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,5 +43,17 @@ impl PartialEq for TetMesh {
             && *tets == other.tets
             && *grid == other.grid
             && *cell_fields == other.cell_fields
+    }
+}
+
+impl From<TetMesh> for Cow<'_, TetMesh> {
+    fn from(mesh: TetMesh) -> Self {
+        Cow::Owned(mesh)
+    }
+}
+
+impl<'a> From<&'a TetMesh> for Cow<'a, TetMesh> {
+    fn from(mesh: &'a TetMesh) -> Self {
+        Cow::Borrowed(mesh)
     }
 }

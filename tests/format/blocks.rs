@@ -94,11 +94,9 @@ fn the_index_tells_where_blocks_are() {
 
 #[test]
 fn header_and_index_are_small() {
-    use std::ops::ControlFlow;
     use tetralod_build::{BuildConfig, build};
     let mesh = tetralod_io::generate::bucky(33).expect("a size that is allowed");
-    let built = build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()))
-        .expect("a good mesh");
+    let built = build(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a good mesh");
     let bytes = encode(&built.mt, &EncodeOptions::default()).expect("complete");
     let sections = sections(&bytes);
     assert_eq!([sections[0].0, sections[1].0], [*b"INFO", *b"INDX"]);

@@ -3,7 +3,6 @@
 use crate::reader;
 use crate::support::files::{assemble, decode, in_blocks, sections};
 use crate::support::meshes::{bent, blocks, hilly};
-use std::ops::ControlFlow;
 use tetralod::format::{Decoder, EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, lattice_box};
 use tetralod::mesh::TetMesh;
@@ -17,7 +16,7 @@ fn decoder(bytes: &[u8]) -> Decoder {
 }
 
 fn built(mesh: &TetMesh, kind: MtKind) -> Mt {
-    build(mesh, &BuildConfig::of(kind), &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
+    build(mesh, &BuildConfig::of(kind)).expect("a valid mesh").mt
 }
 
 fn written(mt: &Mt) -> Vec<u8> {

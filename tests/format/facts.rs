@@ -1,7 +1,6 @@
 //! Promise: what a builder notes of the blocks of a half-edge MT is what a run through the MT finds: files are the same with and without it.
 
 use crate::support::meshes::{bent, cube, hilly};
-use std::ops::ControlFlow;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, UpdatePages};
@@ -25,7 +24,7 @@ fn files_are_the_same_by_what_the_builder_notes() {
     for (name, mesh) in meshes {
         for all_fields in [false, true] {
             let config = BuildConfig { all_fields, block_bits: 6, ..BuildConfig::default() };
-            let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
+            let mt = build(&mesh, &config).expect("a valid mesh").mt;
             is_same(&mt, name);
             let explicit = mt.convert(MtKind::Explicit).expect("a sound MT");
             is_same(&explicit.convert(MtKind::HalfEdge).expect("half-edges"), name);

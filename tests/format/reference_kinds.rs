@@ -10,7 +10,6 @@ use crate::support::domains::Domain;
 use crate::support::files::{bytes_in_blocks, decode, in_blocks, inserted, options, planned, spelled};
 use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::{Field, TetMesh};
@@ -164,7 +163,7 @@ const METHODS: [(Method, BuildCriterion); 3] = [
 fn built(mesh: &TetMesh, (method, criterion): (Method, BuildCriterion), config: BuildConfig) -> Mt {
     let construction = Construction::new(MtKind::Vertex, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..config };
-    tetralod_build::build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
+    tetralod_build::build(mesh, &config).expect("a valid mesh").mt
 }
 
 fn precise(position_bits: u32, field_bits: u32) -> BuildConfig {
@@ -336,7 +335,7 @@ fn exact_values_are_read_alike() {
         let construction =
             Construction::new(kind, method, BuildCriterion::HalfEdge).expect("they go together");
         let config = BuildConfig { construction, all_lossless: true, ..precise(12, 9) };
-        let built = tetralod_build::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
+        let built = tetralod_build::build(&flow, &config);
         let built = built.expect("a valid mesh");
         let spelled = built.mt.convert(MtKind::Explicit).expect("a valid MT");
         for mt in [spelled, built.mt].iter().filter(|mt| mt.info().kind != MtKind::Edge) {
@@ -374,7 +373,7 @@ fn errors_of_tetrahedra_are_read_alike() {
             .and_then(Construction::with_tet_errors)
             .expect("they go together");
         let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
-        let built = tetralod_build::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
+        let built = tetralod_build::build(&mesh, &config);
         let mt = in_blocks(&built.expect("a good mesh").mt, 5);
         let bytes = encode(&mt, &EncodeOptions::default()).expect("a complete MT");
         let (file, changes) = compare(&bytes);

@@ -6,7 +6,6 @@ use crate::support::files::{
 };
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
-use std::ops::ControlFlow;
 use tetralod::format::{Decoder, EncodeError, EncodeOptions, encode_to};
 use tetralod::geom::WIDE_BITS;
 use tetralod::mt::{
@@ -135,7 +134,7 @@ fn offsets_come_back_on_lattices_of_all_widths() {
     for bits in [8, 12, 16, 17, 18, 19, 20, 24, WIDE_BITS] {
         let config = BuildConfig { position_bits: Some(bits), ..BuildConfig::of(MtKind::Edge) };
         let mesh = generate::bucky(6).expect("a small size");
-        let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("an MT");
+        let built = build(&mesh, &config).expect("an MT");
         let mt = built.mt;
         comes_back(&mt, 5);
         let Mt::Edge(coded) = coded(&mt) else { panic!("edge-based") };

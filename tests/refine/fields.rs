@@ -3,7 +3,6 @@
 
 use crate::subjects::{SUBJECTS, applied};
 use crate::support::meshes::{cube, hilly};
-use std::ops::ControlFlow;
 use tetralod::geom::Bounds;
 use tetralod::mt::{EdgeMt, MtKind, MultiTessellation, UpdateId};
 use tetralod::refine::{LodCriterion, Need, Request, RequestError};
@@ -77,7 +76,7 @@ fn what_is_promised_of_a_field_holds_for_every_builder() {
         let fields = names.clone();
         let construction = Construction::new(kind, method, criterion).expect("they go together");
         let config = BuildConfig { construction, fields, ..BuildConfig::of(MtKind::Edge) };
-        let mt = build(&input, &config, &mut |_| ControlFlow::Continue(())).expect("a good mesh").mt;
+        let mt = build(&input, &config).expect("a good mesh").mt;
         let reference = match method {
             Method::Insert => verify::Reference::Points,
             _ => verify::Reference::Mesh,

@@ -4,7 +4,6 @@
 use crate::support::files::encoded;
 use crate::support::meshes::{blocks, tampered};
 use crate::support::random::Random;
-use std::ops::ControlFlow;
 use tetralod::format::{EncodeError, EncodeOptions};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
@@ -29,7 +28,7 @@ fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
     };
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
-    build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+    build(mesh, &config).expect("a mesh to build on").mt
 }
 
 fn edge(mesh: &TetMesh) -> EdgeMt {
@@ -158,7 +157,7 @@ fn much_coarser_meshes_cost_what_they_cost_from_the_base_mesh() {
         let mt = match kind {
             MtKind::HalfEdge => {
                 let config = BuildConfig::of(kind);
-                build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+                build(&mesh, &config).expect("a mesh to build on").mt
             }
             MtKind::Explicit => made(&mesh, MtKind::Edge).convert(kind).expect("any MT can be spelled out"),
             kind => made(&mesh, kind),

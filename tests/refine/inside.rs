@@ -3,7 +3,6 @@
 
 use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
-use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
 use tetralod_build::{BuildConfig, BuildCriterion, Construction, Method, build};
@@ -51,7 +50,7 @@ fn rough() -> TetMesh {
 fn made(mesh: &TetMesh, (kind, method, criterion): (MtKind, Method, BuildCriterion)) -> Mt {
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..BuildConfig::default() };
-    build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+    build(mesh, &config).expect("a mesh to build on").mt
 }
 
 #[test]

@@ -4,7 +4,6 @@
 use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
-use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{CurrentMesh, Mt, MtInfo, MtKind, MultiTessellation};
 use tetralod_build::measure;
@@ -38,7 +37,7 @@ fn made(mesh: &TetMesh, kind: MtKind, position_bits: Option<u32>) -> Mt {
     };
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, position_bits, ..BuildConfig::default() };
-    build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+    build(mesh, &config).expect("a mesh to build on").mt
 }
 
 /// The largest error at the vertices of the input that are inside the mesh.

@@ -4,7 +4,6 @@
 use crate::support::meshes::{cube, hilly, linear};
 use crate::support::random::Random;
 use std::collections::BTreeSet;
-use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 use tetralod::format::{Decoder, EncodeOptions, encode};
 use tetralod::geom::{Bounds, orient3d};
@@ -27,7 +26,7 @@ fn config(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildConfig {
 }
 
 fn built(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildResult {
-    build(mesh, &config(mesh, kind, tet_errors), &mut |_| ControlFlow::Continue(())).expect("a sound mesh")
+    build(mesh, &config(mesh, kind, tet_errors)).expect("a sound mesh")
 }
 
 /// An input with its MT in both kinds.

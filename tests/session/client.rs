@@ -3,7 +3,6 @@
 use crate::support::random::Random;
 use std::cell::Cell;
 use std::io::Cursor;
-use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::time::Duration;
 use tetralod::client::{Client, ClientError, ClientOptions};
@@ -26,7 +25,7 @@ fn file(kind: MtKind) -> Vec<u8> {
     let mesh = generate::bucky(25).expect("a size that is allowed");
     let construction = Construction::default_for(kind);
     let config = BuildConfig { construction, block_bits: BLOCK_BITS, ..BuildConfig::of(MtKind::Edge) };
-    let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
+    let mt = build(&mesh, &config).expect("a valid mesh").mt;
     encode(&mt, &EncodeOptions::default()).expect("a sound MT")
 }
 

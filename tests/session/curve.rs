@@ -1,7 +1,6 @@
 //! Promise: the bytes that the index states for a mesh of some error are those that a session fetches for it, in files that come
 //! by blocks; enough, and not many more than needed, in files that come from front to back.
 
-use std::ops::ControlFlow;
 use tetralod::format::{BlockInfo, DecodeOptions, Decoder, EncodeOptions, ErrorBytes, encode};
 use tetralod::mesh::Field;
 use tetralod::mt::MtKind;
@@ -17,7 +16,7 @@ fn file(kind: MtKind, size: u32) -> Vec<u8> {
     let height = mesh.positions.iter().map(|p| p[2] * p[2] * p[0]).collect();
     mesh.fields.push(Field::new("height", height));
     let config = BuildConfig { block_bits: BLOCK_BITS, all_fields: true, ..BuildConfig::of(kind) };
-    let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
+    let built = build(&mesh, &config).expect("a valid mesh");
     let options = EncodeOptions { histograms: true, ..EncodeOptions::default() };
     encode(&built.mt, &options).expect("a sound MT")
 }

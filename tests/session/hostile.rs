@@ -4,7 +4,6 @@ use crate::support::files::{assemble, overwrite, sections};
 use crate::support::requests::requests;
 use crate::support::strategies::config;
 use proptest::prelude::*;
-use std::ops::ControlFlow;
 use std::sync::LazyLock;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mt::{MtKind, MultiTessellation};
@@ -15,7 +14,7 @@ use tetralod_io::generate::by_name;
 /// A small MT as the builder makes it, and the same spelled out, each with its number of updates.
 static FILES: LazyLock<[(Vec<u8>, u32); 2]> = LazyLock::new(|| {
     let mesh = by_name("bucky", 8).expect("a size that is allowed");
-    let built = build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()));
+    let built = build(&mesh, &BuildConfig::of(MtKind::Edge));
     let edge = built.expect("a good mesh").mt;
     let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
     [edge, spelled].map(|mt| (encode(&mt, &EncodeOptions::default()).expect("a complete MT"), mt.updates()))

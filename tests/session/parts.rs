@@ -2,7 +2,6 @@
 //! stays within the room, and bytes may come in any order.
 
 use crate::support::random::Random;
-use std::ops::ControlFlow;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode};
 use tetralod::geom::Bounds;
 use tetralod::mt::{CurrentMesh, MtKind};
@@ -23,7 +22,7 @@ fn file(kind: MtKind) -> Vec<u8> {
 fn file_of(kind: MtKind, size: u32) -> Vec<u8> {
     let mesh = generate::bucky(size).expect("a size that is allowed");
     let config = BuildConfig { block_bits: BLOCK_BITS, ..BuildConfig::of(kind) };
-    let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
+    let mt = build(&mesh, &config).expect("a valid mesh").mt;
     encode(&mt, &EncodeOptions::default()).expect("a sound MT")
 }
 

@@ -3,7 +3,6 @@
 
 use crate::support::meshes::{cube, hilly, linear};
 use crate::support::random::Random;
-use std::ops::ControlFlow;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode};
 use tetralod::geom::Bounds;
 use tetralod::mt::{Mt, MtKind};
@@ -18,7 +17,7 @@ fn file(kind: MtKind) -> Vec<u8> {
     let mesh = cube(8, &[hilly, linear]);
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
     let config = BuildConfig { block_bits: BLOCK_BITS, fields, ..BuildConfig::of(of) };
-    let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
+    let built = build(&mesh, &config);
     let mt: Mt = built.expect("a valid mesh").mt;
     let mt = if kind == of { mt } else { mt.convert(kind).expect("any MT can be spelled out") };
     let mt = mt.in_pages(BLOCK_BITS).expect("a complete MT");

@@ -4,7 +4,6 @@
 //! The error is bounded at the vertices of the full mesh. Between them nothing is promised, and smaller errors than those
 //! tested here are not kept there: 0.5 % becomes 0.7 % in this picture.
 
-use std::ops::ControlFlow;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::{Bounds, Camera};
 use tetralod::mt::MtKind;
@@ -22,7 +21,7 @@ const BACKGROUND: [f64; 3] = [0.2, 0.3, 0.4];
 fn session() -> Session {
     let mesh = generate::bucky(33).expect("a small size");
     let config = BuildConfig::of(MtKind::HalfEdge);
-    let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a good mesh").mt;
+    let mt = build(&mesh, &config).expect("a good mesh").mt;
     let mut session = Session::new();
     session.feed(&encode(&mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
     session

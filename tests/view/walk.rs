@@ -1,7 +1,7 @@
 //! A current mesh that changes at random, as slices with the ranges that have changed.
 
 use crate::support::random::Random;
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
     Applied, ApplyUpdates, CurrentMesh, MeshChanges, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
@@ -40,7 +40,7 @@ impl Walk {
             if method == Method::Insert { BuildCriterion::Delaunay } else { BuildCriterion::HalfEdge };
         let construction = Construction::new(kind, method, criterion).expect("they go together");
         let config = BuildConfig { construction, fields, ..BuildConfig::of(MtKind::Edge) };
-        let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
+        let mt = build(mesh, &config).expect("a mesh to build on").mt;
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.updates_arrived(&mut mesh, 0);
         let applied = vec![false; mt.updates() as usize];

@@ -13,7 +13,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
-use crate::{licences, release, shell};
+use crate::{licences, shell};
 
 /// Where the package is put together.
 pub const PKG: &str = "pkg";
@@ -38,6 +38,10 @@ const BENCH: Module = Module { name: "tetralod_bench", package: "tetralod-web-be
 /// All crates that are for browsers alone.
 pub const CRATES: [&str; 5] =
     ["tetralod-web", MODULES[0].package, MODULES[1].package, MODULES[2].package, BENCH.package];
+
+/// What is published on crates.io.
+pub const PUBLISHED: [&str; 6] =
+    ["tetralod", "tetralod-io", "tetralod-build", "tetralod-render", "tetralod-bench", "tetralod-cli"];
 
 /// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.
 const WASM_FEATURES: [&str; 6] = [
@@ -251,7 +255,7 @@ pub fn version() -> Result<String> {
     let json: serde_json::Value = serde_json::from_str(&text).context(path)?;
     let npm = json["version"].as_str().unwrap_or_default();
     let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;
-    for package in release::CRATES {
+    for package in PUBLISHED {
         let cargo = locked(&lock, package)?;
         ensure!(npm == cargo, "{path} is version {npm}, the crate {package} is {cargo}");
     }

@@ -6,10 +6,6 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::{package, shell};
 
-/// What is published on crates.io.
-pub const CRATES: [&str; 6] =
-    ["tetralod", "tetralod-io", "tetralod-build", "tetralod-render", "tetralod-bench", "tetralod-cli"];
-
 /// Checks the version and what would be uploaded; with a tag, such as `v0.1.0`, also that it names this version.
 pub fn run(args: &[String]) -> Result<()> {
     let version = package::version()?;
@@ -24,7 +20,7 @@ pub fn run(args: &[String]) -> Result<()> {
     package::build(&[])?;
     // They need each other, which are not on crates.io yet: cargo takes them from here.
     let mut publish = shell::cargo(["publish", "--dry-run", "--locked"]);
-    shell::run(publish.args(CRATES.iter().flat_map(|name| ["--package", name])))?;
+    shell::run(publish.args(package::PUBLISHED.iter().flat_map(|name| ["--package", name])))?;
     shell::run(shell::npm(["publish", "--dry-run", "--access", "public"]).current_dir(package::PKG))
 }
 

@@ -1,5 +1,5 @@
-//! Promise: the library links nothing that only the command needs, TLS only with the feature `http`, and the command
-//! knows the renderer only with the feature `render`, and never JavaScript.
+//! Promise: each crate links what it needs, and no more: the core nothing of files, of pictures or of JavaScript, TLS only with the feature
+//! `http`, and nothing that only the command needs.
 
 use std::process::Command;
 
@@ -22,24 +22,35 @@ fn assert_without(found: &[String], names: &[&str]) {
 }
 
 #[test]
-fn the_library_links_nothing_of_the_command() {
-    let all = linked("tetralod", "build,http,gpu,vulkan,web");
-    for name in ["tetralod", "glam", "ureq", "rustls", "wgpu", "wasm-bindgen", "quick-xml"] {
-        assert!(all.iter().any(|found| found == name), "{name} is not in {all:?}");
+fn libraries_link_nothing_of_the_command() {
+    for (library, features, needed) in [
+        ("tetralod", "parallel,http", &["glam", "ureq", "rustls", "rayon"][..]),
+        ("tetralod-io", "hdf5", &["tetralod", "quick-xml", "hdf5-reader"]),
+        ("tetralod-build", "", &["tetralod", "postcard"]),
+        ("tetralod-render", "", &["tetralod", "wgpu"]),
+    ] {
+        let all = linked(library, features);
+        assert!(needed.iter().all(|name| all.iter().any(|found| found == name)), "{library}: {all:?}");
+        assert_without(
+            &all,
+            &["clap", "axum", "tokio", "tower-http", "hyper", "anyhow", "indicatif", "ctrlc"],
+        );
+        assert_without(&all, &["wasm-bindgen", "js-sys", "web-sys"]);
     }
-    assert_without(&all, &["clap", "axum", "tokio", "tower-http", "hyper", "anyhow", "indicatif", "ctrlc"]);
-    let offline = linked("tetralod", "build,gpu,vulkan,web");
-    assert_without(&offline, &["ureq", "rustls", "ring", "webpki-roots"]);
-    let core = linked("tetralod", "");
-    assert_without(&core, &["ureq", "wgpu", "wasm-bindgen", "quick-xml", "serde_json", "flate2"]);
 }
 
 #[test]
-fn the_command_links_the_renderer_only_to_render_and_no_javascript() {
-    let all = linked("tetralod-cli", "render");
-    assert!(["wgpu", "png"].iter().all(|name| all.iter().any(|found| found == name)), "{all:?}");
-    assert_without(&all, &["wasm-bindgen", "js-sys", "web-sys"]);
-    let command = linked("tetralod-cli", "");
-    assert!(command.iter().any(|found| found == "tetralod"), "{command:?}");
-    assert_without(&command, &["wgpu", "naga", "png", "wasm-bindgen", "js-sys", "web-sys"]);
+fn each_library_links_what_it_needs() {
+    let core = linked("tetralod", "");
+    assert_without(
+        &core,
+        &["ureq", "rayon", "wgpu", "quick-xml", "serde_json", "flate2", "tetralod-io", "tetralod-build"],
+    );
+    assert_without(&linked("tetralod", "parallel"), &["ureq", "rustls", "ring", "webpki-roots"]);
+    assert_without(
+        &linked("tetralod-io", ""),
+        &["hdf5-reader", "netcdf-reader", "wgpu", "ureq", "tetralod-build"],
+    );
+    assert_without(&linked("tetralod-build", ""), &["quick-xml", "wgpu", "ureq", "tetralod-io"]);
+    assert_without(&linked("tetralod-render", ""), &["quick-xml", "ureq", "tetralod-io", "tetralod-build"]);
 }

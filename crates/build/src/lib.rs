@@ -61,31 +61,48 @@ pub use remedy::Remedy;
 pub use result::{BuildResult, BuildSummary};
 
 use std::borrow::Cow;
+use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{ExplicitMt, Mt, MultiTessellation, UpdateId, UpdatePages, VertexId};
 
-/// Builds an MT of `mesh`, which must be valid: see [`tetralod::mesh::repair`].
+/// Builds an MT of `mesh`, which must be valid: see [`tetralod::mesh::repair`]. [`build_with`] can be watched and stopped.
 ///
-/// With the feature `parallel` it uses the threads of rayon's current pool. The result does not depend on how many there are.
-/// Calls `progress` now and then, on the thread that it was called from.
+/// ```
+/// use tetralod_build::{BuildConfig, build};
+///
+/// let mesh = tetralod_io::generate::bucky(9)?;
+/// let built = build(&mesh, &BuildConfig::default())?;
+/// assert_eq!(built.summary.tetrahedra, 6 * 8 * 8 * 8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// If the mesh is not valid, lacks a configured field, or does not fit the lattice.
+pub fn build(mesh: &TetMesh, config: &BuildConfig) -> Result<BuildResult, BuildError> {
+    build_with(mesh, config, &mut |_| ControlFlow::Continue(()))
+}
+
+/// Builds an MT as [`build`] does, and calls `progress` now and then, on the thread that it was called from. A mesh that is given away
+/// saves 16 bytes of memory for each of its tetrahedra, which the builder then works on.
+///
+/// With the feature `parallel` of [`tetralod`] it uses the threads of rayon's current pool. The result does not depend on how many there are.
 ///
 /// ```
 /// use std::ops::ControlFlow;
 /// use std::sync::atomic::{AtomicBool, Ordering};
-/// use tetralod::builder::{BuildConfig, BuildError, build};
+/// use tetralod_build::{BuildConfig, BuildError, build_with};
 ///
-/// let mesh = tetralod::generate::bucky(9)?;
+/// let mesh = tetralod_io::generate::bucky(9)?;
 /// let mut lines = Vec::new();
-/// let built = build(&mesh, &BuildConfig::default(), &mut |at| {
+/// let built = build_with(&mesh, &BuildConfig::default(), &mut |at| {
 ///     lines.push(format!("{}: {} of {}", at.stage, at.done, at.total));
 ///     ControlFlow::Continue(())
 /// })?;
-/// assert_eq!(built.summary.tetrahedra, 6 * 8 * 8 * 8);
 /// assert!(!lines.is_empty());
 ///
 /// // Another thread, or a handler of signals, may set this at any time.
 /// let cancelled = AtomicBool::new(true);
-/// let stopped = build(&mesh, &BuildConfig::default(), &mut |_| {
+/// let stopped = build_with(mesh, &BuildConfig::default(), &mut |_| {
 ///     if cancelled.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 /// });
 /// assert!(matches!(stopped, Err(BuildError::Stopped)));
@@ -93,32 +110,13 @@ use tetralod::mt::{ExplicitMt, Mt, MultiTessellation, UpdateId, UpdatePages, Ver
 /// ```
 ///
 /// # Errors
-/// If the mesh is not valid, lacks a configured field, or does not fit the lattice; if `progress` stops the work.
-pub fn build(
-    mesh: &TetMesh,
+/// As [`build`]; if `progress` stops the work.
+pub fn build_with<'a>(
+    mesh: impl Into<Cow<'a, TetMesh>>,
     config: &BuildConfig,
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
-    build_cow(Cow::Borrowed(mesh), config, progress)
-}
-
-/// As [`build`], but takes the mesh: its tetrahedra become those that the builder works on, which saves 16 bytes of memory for each.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_owned(
-    mesh: TetMesh,
-    config: &BuildConfig,
-    progress: OnProgress<'_>,
-) -> Result<BuildResult, BuildError> {
-    build_cow(Cow::Owned(mesh), config, progress)
-}
-
-fn build_cow(
-    mut mesh: Cow<'_, TetMesh>,
-    config: &BuildConfig,
-    progress: OnProgress<'_>,
-) -> Result<BuildResult, BuildError> {
+    let mut mesh = mesh.into();
     let kind = config.construction.kind();
     restrict::restrictions::check(config)?;
     let result = match config.construction {

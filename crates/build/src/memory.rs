@@ -75,7 +75,7 @@ fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: 
 /// meshes of many shapes, but no promise.
 ///
 /// ```
-/// use tetralod::builder::{BuildConfig, memory_needed};
+/// use tetralod_build::{BuildConfig, memory_needed};
 ///
 /// // A grid of 256³ points: six tetrahedra a cell.
 /// let construction = BuildConfig::default().construction;

@@ -224,7 +224,7 @@ impl MeshBuilder {
         }
         mesh.add_geometry_fields(&config.fields);
         set_units(&mut mesh, &units)?;
-        let built = builder::build_owned(mesh, &config, &mut |step| stages.step(&step));
+        let built = builder::build_with(mesh, &config, &mut |step| stages.step(&step));
         let built = built.map_err(|error| in_input(&name, &error))?;
         stages.begin("encode")?;
         let built_by = config.construction.metadata().into_iter().chain(level.metadata());

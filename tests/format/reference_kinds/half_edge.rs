@@ -11,7 +11,7 @@ use tetralod_build::{Construction, Purpose};
 
 fn built(mesh: &TetMesh, config: BuildConfig) -> Mt {
     let config = BuildConfig { all_fields: true, ..config };
-    let built = tetralod_build::build(mesh, &config, &mut |_| ControlFlow::Continue(()));
+    let built = tetralod_build::build(mesh, &config);
     built.expect("a valid mesh").mt
 }
 
@@ -206,7 +206,7 @@ fn blocks_are_read_and_used_by_themselves() {
 fn exact_values_are_read_alike() {
     let flow = generate::sphere_flow(6).expect("a small size");
     let config = BuildConfig { all_fields: true, all_lossless: true, ..with_bits(Purpose::Uniform, 12, 9) };
-    let built = tetralod_build::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
+    let built = tetralod_build::build(&flow, &config);
     let built = built.expect("a valid mesh");
     let options = EncodeOptions { exact: built.exact.clone(), ..files::options() };
     let (file, changes) = compare(&encode(&built.mt, &options).expect("an MT"));

@@ -8,7 +8,6 @@ use crate::support::meshes::{bent, blocks, cube, hilly, linear};
 use crate::support::oracle::sorted;
 use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::ops::ControlFlow;
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, EdgeMt, ExplicitMt, ExplicitUpdate, HalfEdgeMt, Mt, MtKind, MultiTessellation,
@@ -48,7 +47,7 @@ impl How {
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
         let construction = Construction::new(kind, method, criterion).expect("they go together");
         let config = BuildConfig { construction, fields, position_bits, ..BuildConfig::of(MtKind::Edge) };
-        build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on")
+        build(mesh, &config).expect("a mesh to build on")
     }
 }
 

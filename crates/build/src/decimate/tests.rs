@@ -595,7 +595,7 @@ fn collapses_make_the_updates_of_the_explicit_structure() {
             let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
             let construction = Construction::HalfEdge { purpose };
             let config = BuildConfig { fields, construction, ..BuildConfig::default() };
-            let built = crate::build(&mesh, &config, go_on).expect("a valid mesh");
+            let built = crate::build_with(&mesh, &config, go_on).expect("a valid mesh");
             assert_eq!(built.summary.updates as usize, expected.len(), "{name}");
             let own = ExplicitMt::of(&built.mt).expect("a sound MT");
             assert_eq!(own.check(), Ok(()), "{name} {purpose:?}");

@@ -10,10 +10,10 @@
 //!
 //! ```
 //! use std::ops::ControlFlow;
-//! use tetralod::builder::BuildConfig;
-//! use tetralod::builder::parts::{self, Node};
+//! use tetralod_build::BuildConfig;
+//! use tetralod_build::parts::{self, Node};
 //!
-//! let mesh = tetralod::generate::bucky(9)?;
+//! let mesh = tetralod_io::generate::bucky(9)?;
 //! let mut parted = Vec::new();
 //! let plan = parts::part(&mesh, &BuildConfig::default(), 2, Default::default(), &mut |part| {
 //!     parted.push(part);

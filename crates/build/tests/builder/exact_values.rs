@@ -2,7 +2,6 @@
 
 use crate::support::meshes::{cube, hilly};
 use std::io::Cursor;
-use std::ops::ControlFlow;
 use tetralod::client::{Client, ClientError, ClientOptions};
 use tetralod::format::{EncodeOptions, ExactStatus, FormatError, encode};
 use tetralod::mesh::TetMesh;
@@ -15,7 +14,7 @@ use tetralod_build::{BuildConfig, BuildResult, build};
 /// A file of an edge-based MT with exact values, in small blocks, and the MT's vertex for each point.
 fn file(mesh: &TetMesh) -> (Vec<u8>, Vec<VertexId>) {
     let config = BuildConfig { all_lossless: true, block_bits: 4, ..BuildConfig::of(MtKind::Edge) };
-    let built = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on");
+    let built = build(mesh, &config).expect("a mesh to build on");
     let BuildResult { mt, vertices, exact, .. } = built;
     let options = EncodeOptions { exact, ..EncodeOptions::default() };
     (encode(&mt, &options).expect("a sound MT"), vertices)
@@ -70,8 +69,7 @@ fn a_client_has_exact_values_when_it_has_fetched_them() {
 #[test]
 fn a_file_without_exact_values_has_no_range_of_them() {
     let mesh = cube(5, &[hilly]);
-    let built =
-        build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(())).expect("a mesh");
+    let built = build(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a mesh");
     let bytes = encode(&built.mt, &EncodeOptions::default()).expect("a sound MT");
     let mut client = open(&bytes);
     client.refine(&Request::within(0.0)).expect("a sound file");
@@ -114,7 +112,7 @@ fn a_file_whose_exact_values_are_cut_off_says_so() {
     mesh.fields[0].values[3] = 1.0 / 3.0;
     let config =
         BuildConfig { all_fields: true, all_lossless: true, block_bits: 4, ..BuildConfig::of(MtKind::Edge) };
-    let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on");
+    let built = build(&mesh, &config).expect("a mesh to build on");
     let options = EncodeOptions { exact: built.exact, ..EncodeOptions::default() };
     let bytes = encode(&built.mt, &options).expect("a sound MT");
     let whole = fed(&bytes, 0);

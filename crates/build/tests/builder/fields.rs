@@ -2,7 +2,6 @@
 //! and that exact values are exact.
 
 use crate::support::meshes::{bent, cube, hilly, linear};
-use std::ops::ControlFlow;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::{Field, TetMesh, VectorPart};
 use tetralod::mt::{
@@ -28,7 +27,7 @@ const WAYS: [(MtKind, Method, BuildCriterion); 8] = [
 ];
 
 fn try_build(mesh: &TetMesh, config: &BuildConfig) -> Result<BuildResult, BuildError> {
-    build(mesh, config, &mut |_| ControlFlow::Continue(()))
+    build(mesh, config)
 }
 
 fn made(mesh: &TetMesh, config: &BuildConfig) -> BuildResult {

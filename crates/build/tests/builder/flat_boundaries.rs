@@ -3,7 +3,6 @@
 
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
-use std::ops::ControlFlow;
 use tetralod::mesh::{FACES, NONE, TetMesh};
 use tetralod::mt::{CurrentMesh, Mt, MtKind, MultiTessellation};
 use tetralod::refine::{Front, LodCriterion, Request};
@@ -13,7 +12,7 @@ fn made(mesh: &TetMesh, kind: MtKind, criterion: BuildCriterion) -> Mt {
     let method = if kind == MtKind::Edge { Method::Collapse } else { Method::Decimate };
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
-    build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+    build(mesh, &config).expect("a mesh to build on").mt
 }
 
 /// How many boundary faces are in none of the planes of the axes through these lattice positions, and the corners of the box.

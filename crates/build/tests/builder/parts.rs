@@ -10,7 +10,7 @@ use tetralod::mesh::{Field, Grid, TetMesh};
 use tetralod::mt::{Mt, MtKind, MultiTessellation, UpdatePages};
 use tetralod_build::parts::{self, Node, Part, PartUpdates, PartsError, Plan};
 use tetralod_build::verify::{self, Reference};
-use tetralod_build::{BuildConfig, BuildError, BuildProgress, BuildResult, OnProgress, build};
+use tetralod_build::{BuildConfig, BuildError, BuildProgress, BuildResult, OnProgress};
 
 fn go_on(_: BuildProgress) -> ControlFlow<()> {
     ControlFlow::Continue(())
@@ -105,7 +105,7 @@ fn meshes() -> [(&'static str, TetMesh); 3] {
 fn one_part_is_the_whole() {
     for (name, mesh) in meshes() {
         let config = BuildConfig { all_lossless: true, ..BuildConfig::default() };
-        let whole = build(&mesh, &config, &mut go_on).expect("a valid mesh");
+        let whole = tetralod_build::build_with(&mesh, &config, &mut go_on).expect("a valid mesh");
         let one = in_parts(&mesh, &config, 1);
         assert_eq!(one.summary, whole.summary, "{name}");
         assert!(bytes(&one) == bytes(&whole), "{name}: other bytes");
@@ -116,7 +116,7 @@ fn one_part_is_the_whole() {
 fn parts_make_one_mt_that_keeps_every_promise() {
     for (name, mesh) in meshes() {
         let config = BuildConfig { all_fields: true, ..BuildConfig::default() };
-        let whole = build(&mesh, &config, &mut go_on).expect("a valid mesh").summary;
+        let whole = tetralod_build::build_with(&mesh, &config, &mut go_on).expect("a valid mesh").summary;
         for parts in [2, 8, 16] {
             let built = in_parts(&mesh, &config, parts);
             let summary = built.summary;

@@ -4,7 +4,6 @@ use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use glam::DVec3;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use tetralod::geom::{nearest_on_triangle, orient3d};
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{CurrentMesh, Mt, MtInfo, MtKind, MultiTessellation};
@@ -17,11 +16,11 @@ const ERRORS: [f64; 6] = [0.0, 0.01, 0.05, 0.2, 1.0, f64::INFINITY];
 const N: u32 = 8;
 
 fn made(mesh: &TetMesh, config: &BuildConfig) -> Mt {
-    build(mesh, config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+    build(mesh, config).expect("a mesh to build on").mt
 }
 
 fn refused(mesh: &TetMesh, config: &BuildConfig) -> BuildError {
-    build(mesh, config, &mut |_| ControlFlow::Continue(())).expect_err("it must be refused")
+    build(mesh, config).expect_err("it must be refused")
 }
 
 /// Calls `look` with the mesh at each error.
@@ -232,7 +231,7 @@ fn parts_keep_regions_and_points() {
         let mesh = labelled(regions);
         let keep_points = vec![mesh.positions[100], mesh.positions[365], mesh.positions[400]];
         let config = BuildConfig { preserve: vec!["material".into()], keep_points, ..BuildConfig::default() };
-        let whole = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on");
+        let whole = build(&mesh, &config).expect("a mesh to build on");
         assert!(bytes(&in_parts(&mesh, &config, 1)) == bytes(&whole), "{name}: one part is the whole");
         for parts in [2, 8, 16] {
             let mt = in_parts(&mesh, &config, parts).mt;
@@ -355,7 +354,7 @@ fn curved_interfaces_move_within_their_tolerance() {
             preserve_within: within,
             ..BuildConfig::default()
         };
-        let result = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on");
+        let result = build(&mesh, &config).expect("a mesh to build on");
         let info = result.mt.info();
         let side_of: BTreeMap<[i32; 3], i32> =
             mesh.positions.iter().zip(&sides).map(|(p, side)| (info.lattice.nearest(*p), *side)).collect();

@@ -151,7 +151,7 @@ fn a_larger_budget_is_never_worse() {
 fn errors_fall_and_are_never_zero() {
     for kind in MtKind::ALL {
         let config = BuildConfig::of(kind);
-        let built = build(&cube(5, &[|_| 7.0]), &config, &mut |_| ControlFlow::Continue(()));
+        let built = build(&cube(5, &[|_| 7.0]), &config);
         let mt = built.expect("a valid mesh").mt;
         assert!(mt.updates() > 100);
         // Error 0 means the reference mesh, even where a coarser one is as good.

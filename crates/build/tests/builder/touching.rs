@@ -4,7 +4,6 @@
 use crate::support::meshes::hilly;
 use crate::support::random::Random;
 use std::collections::BTreeSet;
-use std::ops::ControlFlow;
 use tetralod::mesh::{Field, Grid, TetMesh, repair, topology};
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
 use tetralod::refine::{Front, LodCriterion, Request};
@@ -147,7 +146,7 @@ fn keeps_its_shape(name: &str, mesh: &TetMesh, mt: &Mt) {
 fn is_built_by_all(name: &str, mesh: &TetMesh) {
     for (how, config) in configs() {
         let name = format!("{name}, {how}");
-        let built = build(mesh, &config, &mut |_| ControlFlow::Continue(()));
+        let built = build(mesh, &config);
         let mt = built.unwrap_or_else(|error| panic!("{name}: {error}")).mt;
         keeps_its_shape(&name, mesh, &mt);
     }

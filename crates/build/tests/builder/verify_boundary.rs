@@ -1,7 +1,6 @@
 //! Promise: the boundary is within its bound at the places that the documentation names, between vertices too; and verification looks there.
 
 use crate::support::meshes::sheet;
-use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
     ApplyUpdates, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtKind, MultiTessellation, UpdateId, VertexId,
@@ -12,7 +11,7 @@ use tetralod_build::{BuildConfig, build};
 
 fn built(mesh: &TetMesh, kind: MtKind) -> Mt {
     let config = BuildConfig { fields: vec!["f0".into()], ..BuildConfig::of(kind) };
-    build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+    build(mesh, &config).expect("a mesh to build on").mt
 }
 
 fn verified(mt: &impl ApplyUpdates, mesh: &TetMesh) -> VerifyReport {

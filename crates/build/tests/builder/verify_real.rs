@@ -4,7 +4,6 @@
 
 use crate::support::data::real_data;
 use crate::support::meshes::built;
-use std::ops::ControlFlow;
 use tetralod::mesh::{Grid, MeshFindings, RepairLevel, TetMesh, findings, repair, repair_at};
 use tetralod::mt::{ApplyUpdates, MtKind};
 use tetralod_build::verify;
@@ -33,7 +32,7 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
     let build_and_check = |(kind, method, criterion)| {
         let construction = Construction::new(kind, method, criterion).expect("they go together");
         let config = BuildConfig { construction, ..BuildConfig::of(kind) };
-        let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
+        let mt = build(mesh, &config).expect("a mesh to build on").mt;
         let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
         let what = format!("{name}, {} {} {}", kind.name(), method.name(), criterion.name());
         keeps_promises(&what, &mt, mesh, reference);
@@ -176,8 +175,7 @@ fn broken_meshes_end_in_a_valid_mt_or_a_reason_at_each_level() {
                     // The same mesh gives the same MT.
                     if last.as_ref() != Some(&mended) {
                         let config = BuildConfig::of(MtKind::HalfEdge);
-                        let mt =
-                            build(&mended, &config, &mut |_| ControlFlow::Continue(())).expect("an MT").mt;
+                        let mt = build(&mended, &config).expect("an MT").mt;
                         keeps_promises(&format!("{name}, {}", level.name()), &mt, &mended, Reference::Mesh);
                     }
                     last = Some(mended);

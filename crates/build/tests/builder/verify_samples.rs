@@ -1,7 +1,6 @@
 //! Promise: single requests are verified against the input near them, and what is wrong there is found.
 
 use crate::support::meshes::{bent, blocks, hilly, linear};
-use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
 use tetralod_build::verify;
@@ -10,7 +9,7 @@ use tetralod_build::{BuildConfig, build};
 
 fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
     let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
-    build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+    build(mesh, &config).expect("a mesh to build on").mt
 }
 
 fn reports(mt: &Mt, input: &TetMesh, count: usize) -> Vec<(String, VerifyReport)> {

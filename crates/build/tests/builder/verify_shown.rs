@@ -3,7 +3,6 @@
 
 use crate::support::files::{encoded, options};
 use crate::support::meshes::{bent, blocks, hilly, linear};
-use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::MtKind;
 use tetralod::session::Session;
@@ -14,7 +13,7 @@ use tetralod_build::{BuildConfig, build};
 fn check(name: &str, mesh: &TetMesh, kind: MtKind) {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
     let config = BuildConfig { fields, ..BuildConfig::of(kind) };
-    let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
+    let mt = build(mesh, &config).expect("a mesh to build on").mt;
     let bytes = encoded(&mt, &options()).expect("an MT to write");
     let mut session = Session::new();
     session.feed(&bytes).expect("a valid file");

@@ -42,8 +42,8 @@ pub const SAMPLES: u32 = 4;
 /// Runs a future of a native device to its end: such futures make progress when they are asked.
 ///
 /// ```no_run
-/// # fn main() -> Result<(), tetralod::gpu::GpuError> {
-/// let renderer = tetralod::gpu::wait(tetralod::gpu::Renderer::headless([640, 480]))?;
+/// # fn main() -> Result<(), tetralod_render::gpu::GpuError> {
+/// let renderer = tetralod_render::gpu::wait(tetralod_render::gpu::Renderer::headless([640, 480]))?;
 /// # Ok(())
 /// # }
 /// ```
