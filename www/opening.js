@@ -18,7 +18,6 @@ const KINDS = {
   "half-edge": "half-edge (vertex insertions)",
   edge: "edge (vertex splits)",
   vertex: "vertex (vertex insertions)",
-  explicit: "explicit (any updates)",
 };
 
 let opening = 0;

@@ -16,15 +16,12 @@ use tetralod_build::Purpose;
 
 /// Fewest tetrahedra of a set whose first picture is measured.
 const LARGE: usize = 150_000;
-/// Sets of more tetrahedra are built as half-edge MTs alone, and their first pictures are not measured.
+/// First pictures of sets of more tetrahedra are not measured.
 const HUGE: usize = 6_000_000;
 
-/// The kinds that come in blocks, and what they are built for.
-const WAYS: [(&str, MtKind, Purpose); 3] = [
-    ("edge", MtKind::Edge, Purpose::Uniform),
-    ("half-edge", MtKind::HalfEdge, Purpose::Uniform),
-    ("half-edge for regions", MtKind::HalfEdge, Purpose::Regions),
-];
+/// What half-edge MTs, which come in blocks, are built for.
+const WAYS: [(&str, Purpose); 2] =
+    [("half-edge", Purpose::Uniform), ("half-edge for regions", Purpose::Regions)];
 
 /// Shares of the file, in percent, after which a prefix is looked at.
 const LADDER: [f64; 12] = [1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 75.0, 100.0];
@@ -35,15 +32,15 @@ pub fn run(sets: &[Set]) -> Result<()> {
     let mut pictures = Vec::new();
     let mut boxes = Vec::new();
     for set in sets {
-        for (name, kind, purpose) in WAYS {
+        for (name, purpose) in WAYS {
             let is_usual = purpose == Purpose::default();
-            // Presets are compared on what is generated, and of the largest sets one kind is enough.
-            if !is_usual && set.bytes.is_some() || set.mesh.tets.len() > HUGE && kind != MtKind::HalfEdge {
+            // Presets are compared on what is generated.
+            if !is_usual && set.bytes.is_some() {
                 continue;
             }
             let name = format!("{}, {name}", set.name);
             eprintln!("{name}");
-            let file = mt_file(&set.mesh, kind, purpose)?;
+            let file = mt_file(&set.mesh, MtKind::HalfEdge, purpose)?;
             if is_usual && (LARGE..=HUGE).contains(&set.mesh.tets.len()) {
                 pictures.push(picture(set, &name, &file)?);
             }

@@ -28,7 +28,6 @@ struct Found {
     /// Not measured where it would take long.
     vertex: Option<usize>,
     half_edge: usize,
-    index_share: f64,
     /// Million updates decoded per second.
     speed: f64,
     parts: Vec<(&'static str, f64)>,
@@ -37,14 +36,14 @@ struct Found {
 pub fn run(sets: &[Set]) -> Result<()> {
     let found = sets.iter().map(measure).collect::<Result<Vec<_>>>()?;
     println!(
-        "| set | vertices | tets | bits | raw | as given | xz | xz, shuffled | MT, edge | MT, vertex | MT, half-edge | index % | decode |"
+        "| set | vertices | tets | bits | raw | as given | xz | xz, shuffled | MT, edge | MT, vertex | MT, half-edge | decode |"
     );
-    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
     for one in &found {
         let per = |bytes: usize| format!("{:.2}", bytes as f64 / one.vertices as f64);
         let maybe = |bytes: Option<usize>| bytes.map_or("–".to_owned(), per);
         println!(
-            "| {} | {} | {} | {} | {} | {} | {} | {} | **{}** | {} | {} | {:.2} | {:.2} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | **{}** | {} | {} | {:.2} |",
             one.name,
             one.vertices,
             one.tets,
@@ -56,7 +55,6 @@ pub fn run(sets: &[Set]) -> Result<()> {
             per(one.edge),
             maybe(one.vertex),
             per(one.half_edge),
-            100.0 * one.index_share,
             one.speed
         );
     }
@@ -88,11 +86,8 @@ fn measure(set: &Set) -> Result<Found> {
     let vertex = is_small.then(|| mt_file(mesh, MtKind::Vertex, Purpose::default())).transpose()?;
     let half_edge = mt_file(mesh, MtKind::HalfEdge, Purpose::default())?;
     let (decoder, speed) = decode(&edge)?;
-    let index = decoder.index().ok_or("no index")?;
-    let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
     let mt = decoder.mt().ok_or("no MT")?;
     let mut parts = breakdown(mt).unwrap_or_default();
-    parts.push(("index", index_bytes as f64));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
     parts.push(("heads", edge.len() as f64 - known));
     parts.retain(|(_, bytes)| *bytes > 0.0);
@@ -108,7 +103,6 @@ fn measure(set: &Set) -> Result<Found> {
         edge: edge.len(),
         vertex: vertex.map(|file| file.len()),
         half_edge: half_edge.len(),
-        index_share: index_bytes as f64 / edge.len() as f64,
         speed,
         parts,
     })

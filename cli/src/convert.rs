@@ -10,8 +10,8 @@ use std::time::Instant;
 use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::mt::{ConvertError, MtKind, MultiTessellation, UpdatePages};
 
-/// Writes the same updates as an MT of another kind: any kind becomes explicit, and an explicit MT becomes again what
-/// it was made of.
+/// Writes the same updates as an MT of another kind that can hold them (half-edge and vertex, which are both made of vertex
+/// insertions), or in blocks of another size.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The MT file, or its http(s) address.
@@ -19,7 +19,7 @@ pub struct Arguments {
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// The kind of MT that it becomes: half-edge, edge, vertex or explicit.
+    /// The kind of MT that it becomes: half-edge, edge or vertex.
     #[arg(long, value_name = "KIND", value_parser = options::kind)]
     kind: MtKind,
     /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: as in the file; of

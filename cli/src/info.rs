@@ -45,7 +45,9 @@ struct Report {
     tet_errors: bool,
     file_bytes: u64,
     bytes_per_vertex: f64,
-    blocks: Blocks,
+    /// Of kind half-edge.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blocks: Option<Blocks>,
     fields: Vec<Field>,
     /// Of the reference mesh: x0, y0, z0, x1, y1, z1. Where the file was not read to its end, of all its meshes, or a little more.
     bounds: [f64; 6],
@@ -115,7 +117,6 @@ struct Blocks {
     /// From the start of the file to its first block.
     head_bytes: u64,
     largest_bytes: u64,
-    parents_per_block: f64,
 }
 
 /// Some of the bytes of the file.
@@ -194,7 +195,7 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
     let (mt, info) = (opened.mt()?, opened.info()?);
     let base_tetrahedra = mt.base().tets.len();
     let structure = if is_read { Some(structure(opened)?) } else { None };
-    // Files of the first minor versions do not state it.
+    // Files need not state it.
     let found = structure.as_ref().map(|(_, bounds)| bounds.map(|corner| info.lattice.point(corner)));
     let stated = || opened.session.bounds().map(|bounds| [bounds.min, bounds.max]);
     let [[x0, y0, z0], [x1, y1, z1]] = found.or_else(stated).context("the file has no base mesh")?;
@@ -216,7 +217,7 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
         tet_errors: mt.has_tet_errors(),
         file_bytes: opened.bytes,
         bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
-        blocks: blocks(opened)?,
+        blocks: blocks(opened),
         fields: info.fields.iter().enumerate().map(field).collect(),
         bounds: [x0, y0, z0, x1, y1, z1],
         position_bits: info.lattice.bits,
@@ -236,29 +237,30 @@ fn curve(opened: &Opened, field: usize) -> Vec<CurvePoint> {
         .collect()
 }
 
-fn blocks(opened: &Opened) -> Result<Blocks> {
+/// None where the file has no index.
+fn blocks(opened: &Opened) -> Option<Blocks> {
     let decoder = opened.session.decoder();
-    let index = decoder.index().context("the file has no index")?;
+    let index = decoder.index()?;
     let head_bytes = decoder.head_end().unwrap_or(0);
-    let parents: usize = index.blocks.iter().map(|block| block.parents.len()).sum();
-    Ok(Blocks {
+    Some(Blocks {
         count: index.blocks.len(),
         updates_per_block: 1 << index.block_bits,
         index_bytes: head_bytes.saturating_sub(index.shared),
         head_bytes,
         largest_bytes: index.blocks.iter().map(BlockInfo::len).max().unwrap_or(0),
-        parents_per_block: parents as f64 / index.blocks.len().max(1) as f64,
     })
 }
 
 fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
-    let decoder = opened.session.decoder();
-    let index = decoder.index().context("the file has no index")?;
-    let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
     let mut parts = format::breakdown(opened.mt()?)?;
-    parts.push(("header, description and index", index_bytes as f64));
+    let blocks = blocks(opened);
+    parts.extend(blocks.as_ref().map(|blocks| ("header, description and index", blocks.index_bytes as f64)));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
-    parts.push(("histograms, heads and ends of sections", opened.bytes as f64 - known));
+    let rest = match blocks {
+        Some(_) => "histograms, heads and ends of sections",
+        None => "header, description, histograms, heads and ends of sections",
+    };
+    parts.push((rest, opened.bytes as f64 - known));
     // Few files keep any.
     parts.retain(|(name, bytes)| *bytes != 0.0 || !["exact values", "errors of tetrahedra"].contains(name));
     let vertices = f64::from(opened.info()?.vertices.max(1));
@@ -344,6 +346,29 @@ fn part_row(part: &FilePart, file_bytes: u64) -> String {
     format!("{}: {:.2} per vertex ({share})", part.name, part.bytes_per_vertex)
 }
 
+fn block_rows(blocks: &Blocks, file_bytes: u64) -> [(&'static str, String); 2] {
+    [
+        (
+            "blocks",
+            format!(
+                "{} of {} updates, up to {} each",
+                blocks.count,
+                blocks.updates_per_block,
+                output::bytes(blocks.largest_bytes)
+            ),
+        ),
+        (
+            "in front of them",
+            format!(
+                "{}; to the end of the index {} ({} of the file)",
+                output::bytes(blocks.head_bytes),
+                output::bytes(blocks.index_bytes),
+                output::percent(blocks.index_bytes as f64 / file_bytes.max(1) as f64)
+            ),
+        ),
+    ]
+}
+
 fn rows(report: &Report) -> Vec<(&str, String)> {
     let axis = |i: usize| output::ends([report.bounds[i], report.bounds[i + 3]]);
     let [[x0, x1], [y0, y1], [z0, z1]] = [axis(0), axis(1), axis(2)];
@@ -362,25 +387,8 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
         ("errors", if report.tet_errors { "of tetrahedra, 2 bits each" } else { "of updates" }.to_owned()),
         ("file size", output::bytes(report.file_bytes)),
         ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
-        (
-            "blocks",
-            format!(
-                "{} of {} updates, up to {} each",
-                report.blocks.count,
-                report.blocks.updates_per_block,
-                output::bytes(report.blocks.largest_bytes)
-            ),
-        ),
-        (
-            "in front of them",
-            format!(
-                "{}; to the end of the index {} ({} of the file)",
-                output::bytes(report.blocks.head_bytes),
-                output::bytes(report.blocks.index_bytes),
-                output::percent(report.blocks.index_bytes as f64 / report.file_bytes.max(1) as f64)
-            ),
-        ),
     ]);
+    rows.extend(report.blocks.iter().flat_map(|blocks| block_rows(blocks, report.file_bytes)));
     if let Some(Structure { memory, .. }) = structure {
         rows.extend([
             ("in memory", output::bytes(memory.compact_bytes)),
@@ -398,7 +406,10 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
         rows.push(("field", field_row(steps)));
         // Time steps are alike.
         rows.extend(steps[0].histogram.as_deref().map(|shares| ("  values", histogram_row(shares))));
-        rows.push(("  bytes at error", curve_row(&steps[0].curve)));
+        // Files that are read from front to back state their length alone.
+        if steps[0].curve.len() > 1 {
+            rows.push(("  bytes at error", curve_row(&steps[0].curve)));
+        }
     }
     let parts = structure.iter().flat_map(|all| &all.breakdown);
     rows.extend(parts.map(|part| ("bytes of", part_row(part, report.file_bytes))));

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tetralod::client::{Client, ClientError, Step};
 use tetralod::format::FormatError;
-use tetralod::mt::{FieldInfo, MtInfo, UpdatePages};
+use tetralod::mt::{FieldInfo, Mt, MtInfo};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
 use tetralod_io::{PointValues, PolyData};
 
@@ -169,7 +169,7 @@ impl Query {
         };
         // Which blocks of a half-edge MT are needed shows only while the mesh is refined.
         let mut before = RefineStats::default();
-        while client.session().mt().is_some_and(|mt| !mt.needs_parents()) {
+        while client.session().mt().is_some_and(Mt::is_paged) {
             let Step { stats, complete } = client.step(PATIENCE, &mut go_on)?;
             before.add_work(&stats);
             if complete || stopped.get() {

@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (which, script) in scripts.iter().enumerate() {
             let input = [&script[..], &bytes].concat();
             for target in ["decode", "decode_fixed", "index", "refine"] {
-                if target != "index" || name.starts_with("edge") {
+                if target != "index" || name.starts_with("half-edge") {
                     write(&corpus.join(target), &format!("{name}-{which}"), &input)?;
                 }
             }
@@ -66,7 +66,6 @@ fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
         let edge = build(&mesh, &all)?.mt;
         put(&format!("edge-{model}-{size}"), &edge, 4)?;
         put(&format!("edge-{model}-{size}"), &edge, 8)?;
-        put(&format!("explicit-{model}-{size}"), &edge.convert(MtKind::Explicit)?, 4)?;
         for kind in [MtKind::Vertex, MtKind::HalfEdge] {
             let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
             if let Ok(built) = build(&mesh, &config) {

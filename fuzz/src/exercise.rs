@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use tetralod::format::{DecodeOptions, Decoder, Limits};
 use tetralod::geom::Bounds;
-use tetralod::mt::{Mt, MtInfo, MultiTessellation, UpdatePages};
+use tetralod::mt::{MtInfo, MultiTessellation, UpdatePages};
 use tetralod::refine::{Front, LodCriterion, Need, Request};
 use tetralod::session::Session;
 use tetralod_io as io;
@@ -108,7 +108,7 @@ pub fn index(input: &[u8]) {
         let block = (u32::from(byte) + step as u32 / SCRIPT as u32 * 5) % (blocks + 1);
         if byte & 0xC0 == 0xC0 {
             leave(&mut decoder, &mut front, block);
-        } else if parents_are_here(&decoder, block) {
+        } else {
             arrive(&mut decoder, &mut front, block, &file);
         }
         let Some(mt) = decoder.mt() else { return };
@@ -116,12 +116,6 @@ pub fn index(input: &[u8]) {
         let _ = front.satisfy(mt, &criterion, Default::default());
         assert_eq!(front.mesh().check(), Ok(()));
     }
-}
-
-fn parents_are_here(decoder: &Decoder, block: u32) -> bool {
-    let (Some(index), Some(Mt::Edge(mt))) = (decoder.index(), decoder.mt()) else { return false };
-    let info = index.blocks.get(block as usize);
-    info.is_some_and(|info| info.parents.iter().all(|&parent| mt.has_page(parent)))
 }
 
 fn arrive(decoder: &mut Decoder, front: &mut Front, block: u32, file: &[u8]) {
@@ -143,17 +137,9 @@ fn arrive(decoder: &mut Decoder, front: &mut Front, block: u32, file: &[u8]) {
 }
 
 fn leave(decoder: &mut Decoder, front: &mut Front, block: u32) {
-    let Some(Mt::Edge(mt)) = decoder.mt() else { return };
-    let needed = decoder.index().is_some_and(|index| {
-        (0..).zip(&index.blocks).any(|(other, info)| mt.has_page(other) && info.parents.contains(&block))
-    });
-    if mt.has_page(block) && !needed && front.prepare_eviction(mt, block) {
-        // One that a lying index did not tell of may depend on it.
-        if decoder.drop_block(block).is_err()
-            && let Some(mt) = decoder.mt()
-        {
-            front.page_inserted(mt, block);
-        }
+    let Some(mt) = decoder.mt() else { return };
+    if mt.has_page(block) && front.prepare_eviction(mt, block) {
+        assert_eq!(decoder.drop_block(block), Ok(()), "it is here, and nothing needs it");
     }
 }
 
@@ -342,7 +328,7 @@ pub fn repaired(file: &[u8]) -> Vec<u8> {
         sections += 1;
         at = payload + length;
     }
-    bytes[..10].copy_from_slice(b"\x89TLOD\r\n\x1a\x02\x00");
+    bytes[..10].copy_from_slice(b"\x89TLOD\r\n\x1a\x01\x00");
     bytes[12..16].fill(0);
     let total = bytes.len() as u64;
     bytes[16..24].copy_from_slice(&total.to_le_bytes());

@@ -1,13 +1,13 @@
 //! A run through an MT from the base to the reference mesh, for what its file says of each block.
 
+use super::payload::codec::Codec;
 use super::payload::histogram::Histograms;
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, ErrorCode, Excess, HalfEdgeMt, Margins, Mt, MtFacts,
-    MultiTessellation, UpdateError, UpdateId, UpdatePages, level_volumes,
+    Applied, ApplyUpdates, CurrentMesh, ErrorCode, Excess, Margins, MtFacts, UpdateError, UpdateId,
+    level_volumes,
 };
-use std::collections::BTreeSet;
 
 /// What a run through an MT has found.
 pub struct BlockScan {
@@ -20,18 +20,16 @@ pub struct BlockScan {
 }
 
 impl BlockScan {
-    pub fn of(mt: &Mt, options: &EncodeOptions) -> Result<Self, EncodeError> {
-        if let Mt::HalfEdge(mt) = mt
-            && let Some(facts) = mt.facts().filter(|_| options.exact.is_empty())
-        {
-            return by_facts(mt, facts, options);
+    pub fn of(mt: &impl Codec, options: &EncodeOptions) -> Result<Self, EncodeError> {
+        match mt.known_facts().filter(|_| options.exact.is_empty()) {
+            Some(facts) => by_facts(mt, facts, options),
+            None => run(mt, options),
         }
-        run(mt, options)
     }
 }
 
 /// What a run would find that was made before.
-fn by_facts(mt: &HalfEdgeMt, facts: &MtFacts, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
+fn by_facts(mt: &impl Codec, facts: &MtFacts, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
     let excess = if options.check_margins { facts.excess } else { facts.larger };
     if let Some(excess) = excess {
         return Err(out_of_order(excess));
@@ -44,7 +42,7 @@ fn by_facts(mt: &HalfEdgeMt, facts: &MtFacts, options: &EncodeOptions) -> Result
             bounds,
             errors: (0..fields).map(|f| largest(f).unwrap_or(ErrorCode::ZERO)).collect(),
             ranges: facts.ranges[block * fields..][..fields].to_vec(),
-            ..BlockInfo::default()
+            lengths: Vec::new(),
         }
     };
     Ok(BlockScan {
@@ -89,10 +87,8 @@ fn scan_block(
         bounds: [[i32::MAX; 3], [i32::MIN; 3]],
         errors: vec![ErrorCode::ZERO; fields],
         ranges: vec![[i32::MAX, i32::MIN]; fields],
-        ..BlockInfo::default()
+        lengths: Vec::new(),
     };
-    let own = updates.start >> mt.page_bits();
-    let mut parents = BTreeSet::new();
     let (mut tets, mut vertices) = (Vec::new(), Vec::new());
     for u in updates.map(UpdateId) {
         for (f, error) in block.errors.iter_mut().enumerate() {
@@ -105,10 +101,6 @@ fn scan_block(
         {
             return Err(out_of_order(excess));
         }
-        // Else each block can be used without the others.
-        if mt.needs_parents() {
-            parents.extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> mt.page_bits()));
-        }
         widen(&mut block, mesh, &tets, &mut vertices);
         match mt.refine(mesh, u).map_err(EncodeError::Update)? {
             Applied::Done => {}
@@ -119,8 +111,6 @@ fn scan_block(
         mt.find_inserted(mesh, u, &mut tets).map_err(EncodeError::Update)?;
         widen(&mut block, mesh, &tets, &mut vertices);
     }
-    parents.remove(&own);
-    block.parents = parents.into_iter().collect();
     Ok(block)
 }
 

@@ -1,18 +1,18 @@
 //! An MT to bytes: the same MT and options give the same bytes everywhere.
 
 use super::block_scan::BlockScan;
-use super::coder::{Counts, Measure, Models, Put, Writer};
-use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, header, version_for};
+use super::coder::{Measure, Models, Put, Writer};
+use super::header::{END_BYTES, HEADER_BYTES, Kind, Start, header};
 use super::payload::Totals;
+use super::payload::codec::Codec;
 use super::payload::exact::Corrections;
 use super::payload::histogram::Histograms;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
-use super::{checksum, payload, write};
-use crate::mt::{BaseMeshError, Exact, Mt, MultiTessellation, UpdateError, UpdatePages, VertexId};
-use crate::threads;
+use super::section::Section;
+use super::{checksum, payload};
+use crate::mt::{BaseMeshError, Exact, Mt, MtKind, MultiTessellation, UpdateError, VertexId};
 use std::collections::BTreeMap;
 use std::io;
-use std::ops::Range;
 use thiserror::Error;
 
 /// What goes into a file besides the MT.
@@ -34,6 +34,12 @@ pub struct EncodeOptions {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EncodeError {
+    /// No file has MTs of this kind.
+    #[error("an MT of kind {} lives in memory alone; convert it to the kind that it was made of", .kind.name())]
+    Kind {
+        /// The kind.
+        kind: MtKind,
+    },
     /// Not all updates of the MT are there.
     #[error(
         "the MT has {updates} of the {expected} updates that its description contains; write it when it is complete"
@@ -102,12 +108,23 @@ pub fn encode(mt: &Mt, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> 
 /// # Errors
 /// As [`encode`], and when `writer` fails.
 pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -> Result<u64, EncodeError> {
+    match mt {
+        Mt::Edge(mt) => encode_kind(mt, options, writer),
+        Mt::Vertex(mt) => encode_kind(mt, options, writer),
+        Mt::HalfEdge(mt) => encode_kind(mt, options, writer),
+        Mt::Explicit(mt) => Err(EncodeError::Kind { kind: mt.info().kind }),
+    }
+}
+
+fn encode_kind<C: Codec>(
+    mt: &C,
+    options: &EncodeOptions,
+    writer: &mut dyn io::Write,
+) -> Result<u64, EncodeError> {
     check(mt)?;
-    let BlockScan { blocks, reference, histograms } = BlockScan::of(mt, options)?;
-    let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks };
-    index.round(mt.info());
-    let exact = corrections(mt, &options.exact, &reference)?;
-    let sections = sections(mt, &options.metadata, &mut index, histograms.as_ref(), &exact)?;
+    let scan = BlockScan::of(mt, options)?;
+    let exact = corrections(mt, &options.exact, &scan.reference)?;
+    let sections = sections(mt, &options.metadata, scan, &exact)?;
     let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
     let mut totals = Totals { updates: mt.updates(), sections: sections.len() as u32, crc: 0 };
     let mut chain = checksum::Hasher::new();
@@ -120,11 +137,12 @@ pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -
     payload::write_end(&mut end, totals);
     let end = Section::new(Kind::ENDF, end)?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
-    put(&header(
-        total,
-        version_for(mt.info().kind, options.histograms, mt.info().bounds.is_some()),
-        mt.has_tet_errors(),
-    ))?;
+    let has_index = mt.info().kind.is_paged();
+    put(&header(Start {
+        total: Some(total),
+        tet_errors: mt.has_tet_errors(),
+        exact: !has_index && !exact.is_empty(),
+    }))?;
     for section in sections.iter().chain([&end]) {
         put(&section.head.to_bytes())?;
         put(&section.payload)?;
@@ -134,7 +152,7 @@ pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -
 }
 
 /// What a decoder would refuse must not be written.
-fn check(mt: &Mt) -> Result<(), EncodeError> {
+fn check<C: Codec>(mt: &C) -> Result<(), EncodeError> {
     if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&mt.page_bits()) {
         return Err(EncodeError::Blocks { bits: mt.page_bits() });
     }
@@ -143,58 +161,51 @@ fn check(mt: &Mt) -> Result<(), EncodeError> {
         return Err(EncodeError::Incomplete { updates: mt.present(), expected: info.updates });
     }
     mt.base().check(info).map_err(EncodeError::Base)?;
-    payload::check_counts(info, mt.base().positions.len() as u64)
-        .and_then(|()| payload::check_reference(mt))
-        .map_err(EncodeError::Base)
+    C::check_counts(info, mt.base().positions.len() as u64).map_err(EncodeError::Base)
 }
 
-/// A section that is ready to be written.
-struct Section {
-    head: SectionHead,
-    payload: Vec<u8>,
-}
-
-impl Section {
-    fn new(kind: Kind, payload: Vec<u8>) -> Result<Self, EncodeError> {
-        if u32::try_from(payload.len() + HEAD_BYTES).is_err() {
-            return Err(EncodeError::TooLong { what: "a section of more than 4 GiB" });
-        }
-        Ok(Self { head: SectionHead::new(kind, &payload), payload })
-    }
-
-    /// A section that begins with some bytes, the rest of which is coded.
-    fn coded(
-        kind: Kind,
-        head: &[u32],
-        models: &Models,
-        put: impl FnOnce(&mut Writer<'_>),
-    ) -> Result<Self, EncodeError> {
-        let mut payload = Vec::new();
-        head.iter().for_each(|&number| write::varint(&mut payload, u64::from(number)));
-        let mut writer = Writer::new(models);
-        put(&mut writer);
-        writer.finish(&mut payload);
-        Self::new(kind, payload)
-    }
-
-    /// Bytes with the head.
-    fn len(&self) -> u64 {
-        (HEAD_BYTES + self.payload.len()) as u64
-    }
-}
-
-/// All sections but the last. Lengths are entered into the index.
-fn sections(
-    mt: &Mt,
+/// All sections but the last.
+fn sections<C: Codec>(
+    mt: &C,
     metadata: &BTreeMap<String, String>,
-    index: &mut Index,
-    histograms: Option<&Histograms>,
+    scan: BlockScan,
     exact: &[(u32, Corrections)],
 ) -> Result<Vec<Section>, EncodeError> {
-    let fields = mt.info().fields.len();
-    let mut counts = count_all(mt)?;
+    let mut counts = mt.count_updates()?;
+    put_base(&mut counts, mt);
     exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
     let models = Models::new(&counts);
+    let shared = shared_sections(mt, &models, scan.histograms.as_ref())?;
+    let of_blocks = mt.sections(&models)?;
+    let mut payload = Vec::new();
+    payload::write_info(&mut payload, mt.info(), metadata)?;
+    let mut sections = vec![Section::new(Kind::INFO, payload)?];
+    if mt.info().kind.is_paged() {
+        let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks: scan.blocks };
+        index.round(mt.info());
+        index.shared = shared.iter().map(Section::len).sum();
+        for (block, sections) in index.blocks.iter_mut().zip(&of_blocks) {
+            block.lengths = sections.iter().map(|section| section.len() as u32).collect();
+        }
+        let mut payload = Vec::new();
+        index.write(&mut payload, mt.info());
+        sections.push(Section::new(Kind::INDX, payload)?);
+    }
+    sections.extend(shared);
+    sections.extend(of_blocks.into_iter().flatten());
+    for (field, corrections) in exact {
+        let head = [*field, u32::from(!corrections.is_single()), corrections.count()];
+        sections.push(Section::coded(Kind::EXACT, &head, &models, |out| corrections.put(out))?);
+    }
+    Ok(sections)
+}
+
+/// What stands in front of the blocks, without the description and the index.
+fn shared_sections<C: Codec>(
+    mt: &C,
+    models: &Models,
+    histograms: Option<&Histograms>,
+) -> Result<Vec<Section>, EncodeError> {
     let mut shared = Vec::new();
     if let Some(histograms) = histograms {
         let mut payload = Vec::new();
@@ -212,7 +223,7 @@ fn sections(
     let mut payload = Vec::new();
     payload::write_base_head(&mut payload, mt);
     let head = payload.len();
-    let mut writer = Writer::new(&models);
+    let mut writer = Writer::new(models);
     payload::put_base(&mut writer, mt);
     writer.finish(&mut payload);
     let counts = [mt.base().positions.len() as u64, mt.base().tets.len() as u64];
@@ -220,34 +231,17 @@ fn sections(
         return Err(EncodeError::TooLong { what: "a base mesh that is coded in so few bytes" });
     }
     shared.push(Section::new(Kind::BASE, payload)?);
-    for field in 0..fields {
-        shared.push(Section::coded(Kind::FLDB, &[field as u32], &models, |out| {
+    for field in 0..mt.info().fields.len() {
+        shared.push(Section::coded(Kind::FLDB, &[field as u32], models, |out| {
             payload::put_base_field(out, mt, field);
         })?);
     }
-    index.shared = shared.iter().map(Section::len).sum();
-    let of_blocks = put_blocks(mt, index, &models)?;
-    let mut blocks = Vec::with_capacity(of_blocks.iter().map(Vec::len).sum());
-    for (block, sections) in index.blocks.iter_mut().zip(of_blocks) {
-        block.lengths = sections.iter().map(|section| section.len() as u32).collect();
-        blocks.extend(sections);
-    }
-    for (field, corrections) in exact {
-        let head = [*field, u32::from(!corrections.is_single()), corrections.count()];
-        blocks.push(Section::coded(Kind::EXACT, &head, &models, |out| corrections.put(out))?);
-    }
-    let mut payload = Vec::new();
-    payload::write_info(&mut payload, mt.info(), metadata)?;
-    let info = Section::new(Kind::INFO, payload)?;
-    let mut payload = Vec::new();
-    index.write(&mut payload, mt.info());
-    let index = Section::new(Kind::INDX, payload)?;
-    Ok([info, index].into_iter().chain(shared).chain(blocks).collect())
+    Ok(shared)
 }
 
 /// What is to be written of exact values: by field, ascending.
 fn corrections(
-    mt: &Mt,
+    mt: &impl Codec,
     exact: &[Exact],
     reference: &[(u32, Vec<i32>)],
 ) -> Result<Vec<(u32, Corrections)>, EncodeError> {
@@ -266,57 +260,9 @@ fn corrections(
 }
 
 /// Puts what comes before the updates.
-fn put_base(out: &mut impl Put, mt: &Mt) {
+fn put_base(out: &mut impl Put, mt: &impl Codec) {
     payload::put_base(out, mt);
     (0..mt.info().fields.len()).for_each(|field| payload::put_base_field(out, mt, field));
-}
-
-/// Puts all that is coded of a file.
-fn put_all(out: &mut impl Put, mt: &Mt) -> Result<(), EncodeError> {
-    put_base(out, mt);
-    let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
-    let mut first = 0;
-    while first < mt.updates() {
-        let end = mt.updates().min(first + (1 << mt.page_bits()));
-        if mt.info().kind.is_paged() {
-            put_page(out, mt, &(first..end));
-        } else {
-            payload::put_updates(out, mt, first..end, state.as_mut()).map_err(EncodeError::Update)?;
-        }
-        first = end;
-    }
-    Ok(())
-}
-
-/// Puts a block of an MT whose blocks do not depend on each other.
-fn put_page(out: &mut impl Put, mt: &Mt, updates: &Range<u32>) {
-    payload::put_shared(out, mt, updates.clone());
-    (0..mt.info().fields.len()).for_each(|field| payload::put_field(out, mt, updates.clone(), field));
-}
-
-/// So many blocks are counted together: each table of counts takes memory.
-const COUNTED: usize = 16;
-
-/// How often each symbol occurs in what [`put_all`] puts.
-fn count_all(mt: &Mt) -> Result<Counts, EncodeError> {
-    let block_bits = mt.page_bits();
-    let mut all = Counts::default();
-    if !mt.info().kind.is_paged() {
-        put_all(&mut all, mt)?;
-        return Ok(all);
-    }
-    put_base(&mut all, mt);
-    let updates = mt.updates() as usize;
-    let of_ranges = threads::map(updates.div_ceil(1 << block_bits), COUNTED, |blocks| {
-        let mut counts = Counts::default();
-        for block in blocks {
-            let first = block << block_bits;
-            put_page(&mut counts, mt, &(first as u32..updates.min(first + (1 << block_bits)) as u32));
-        }
-        counts
-    });
-    of_ranges.iter().for_each(|counts| all.add(counts));
-    Ok(all)
 }
 
 /// How many bytes of the file of an MT code what: names and bytes. Only for MTs that came from a file; exact
@@ -325,13 +271,23 @@ fn count_all(mt: &Mt) -> Result<Counts, EncodeError> {
 /// # Errors
 /// If the MT is damaged.
 pub fn breakdown(mt: &Mt) -> Result<Vec<(&'static str, f64)>, EncodeError> {
-    let mut counts = Counts::default();
-    put_all(&mut counts, mt)?;
+    match mt {
+        Mt::Edge(mt) => breakdown_of(mt),
+        Mt::Vertex(mt) => breakdown_of(mt),
+        Mt::HalfEdge(mt) => breakdown_of(mt),
+        Mt::Explicit(mt) => Err(EncodeError::Kind { kind: mt.info().kind }),
+    }
+}
+
+fn breakdown_of<C: Codec>(mt: &C) -> Result<Vec<(&'static str, f64)>, EncodeError> {
+    let mut counts = mt.count_updates()?;
+    put_base(&mut counts, mt);
     let models = Models::new(&counts);
     let mut measure = Measure::new(&models);
-    put_all(&mut measure, mt)?;
+    put_base(&mut measure, mt);
+    mt.put_updates(&mut measure)?;
     let mut parts: Vec<(&'static str, f64)> = Vec::new();
-    for (name, family) in payload::parts(mt.info().kind) {
+    for (name, family) in payload::parts(C::PARTS) {
         let bytes = measure.bits_of(family) / 8.0;
         match parts.iter_mut().find(|(known, _)| *known == name) {
             Some((_, sum)) => *sum += bytes,
@@ -342,40 +298,6 @@ pub fn breakdown(mt: &Mt) -> Result<Vec<(&'static str, f64)>, EncodeError> {
     models.write(&mut tables);
     parts.push(("tables", tables.len() as f64));
     Ok(parts)
-}
-
-/// The sections of each block.
-fn put_blocks(mt: &Mt, index: &Index, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
-    let kind = payload::section_of(mt.info().kind);
-    if mt.info().kind.is_paged() {
-        return threads::map(index.blocks.len(), 1, |block| {
-            put_sections(mt, block.start as u32, index, models)
-        })
-        .into_iter()
-        .collect();
-    }
-    let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
-    let mut of_block = |block: u32| {
-        let (updates, mut done) = (index.updates(block, mt.updates()), Ok(()));
-        let section = Section::coded(kind, &[block], models, |out| {
-            done = payload::put_updates(out, mt, updates, state.as_mut());
-        });
-        done.map_err(EncodeError::Update)?;
-        Ok(vec![section?])
-    };
-    (0..index.blocks.len() as u32).map(&mut of_block).collect()
-}
-
-/// The sections of a block of an MT whose blocks do not depend on each other.
-fn put_sections(mt: &Mt, block: u32, index: &Index, models: &Models) -> Result<Vec<Section>, EncodeError> {
-    let updates = index.updates(block, mt.updates());
-    let kind = payload::section_of(mt.info().kind);
-    let shared = Section::coded(kind, &[block], models, |out| payload::put_shared(out, mt, updates.clone()));
-    let of_field = |field: usize| {
-        let put = |out: &mut Writer<'_>| payload::put_field(out, mt, updates.clone(), field);
-        Section::coded(Kind::FLDU, &[block, field as u32], models, put)
-    };
-    std::iter::once(shared).chain((0..mt.info().fields.len()).map(of_field)).collect()
 }
 
 impl crate::Coded for EncodeError {

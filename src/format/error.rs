@@ -19,15 +19,14 @@ pub enum FormatError {
     NotMt,
     /// The file has a version that this reader does not know.
     #[error(
-        "the MT file has version {}.{}, this reader knows {}.{}; update tetralod, or build the file again with this \
-         version",
-        .found[0], .found[1], .supported[0], .supported[1]
+        "the MT file has version {found}, this reader knows {supported}; update tetralod, or build the file again with \
+         this version"
     )]
     UnsupportedVersion {
-        /// Major and minor version of the file.
-        found: [u16; 2],
-        /// Major and minor version that this reader was made for.
-        supported: [u16; 2],
+        /// The version of the file.
+        found: u16,
+        /// The version that this reader was made for.
+        supported: u16,
     },
     /// The file relies on a section or a flag that this reader does not know.
     #[error("the MT file needs {what} (at byte {offset}); update tetralod")]

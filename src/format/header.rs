@@ -1,18 +1,11 @@
 //! The fixed parts of a file: its header and the heads of its sections.
 
 use super::{FormatError, checksum};
-use crate::mt::MtKind;
 
 /// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
 pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
-/// Where in the file the version stands.
-pub const VERSION_AT: u64 = 8;
-/// Major and minor version of the newest files that this module writes.
-pub const VERSION: [u16; 2] = [3, 2];
-/// What files without half-edge MTs are written as: version 3 has these besides.
-const VERSION_WITHOUT_HALF_EDGE: [u16; 2] = [2, 2];
-/// The oldest major version that is read.
-const OLDEST: u16 = VERSION_WITHOUT_HALF_EDGE[0];
+/// The version of the format: the only one that is written and read.
+const VERSION: u16 = 1;
 /// Bytes of the file header.
 pub const HEADER_BYTES: usize = 32;
 /// Bytes of a section's head.
@@ -23,33 +16,29 @@ pub const END_BYTES: usize = HEAD_BYTES + 12;
 const CRITICAL_FLAGS: u32 = 0xFFFF;
 /// Of these: updates contain errors of the tetrahedra that they remove.
 const TET_ERRORS: u32 = 1;
+/// A hint in files without an index: exact values stand behind the updates.
+const EXACT: u32 = 1 << 16;
 
 /// What is in a header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Start {
-    /// Major and minor.
-    pub version: [u16; 2],
     /// Bytes of the whole file, if the writer knew.
     pub total: Option<u64>,
     /// Whether updates contain errors of the tetrahedra that they remove.
     pub tet_errors: bool,
+    /// Whether exact values stand behind the updates, as far as the header says so: it does where there is no index.
+    pub exact: bool,
 }
 
-/// The lowest version of files that hold an MT of this kind, histograms (which minor version 1 adds), and the box around the reference
-/// mesh (which minor version 2 adds).
-pub fn version_for(kind: MtKind, has_histograms: bool, has_bounds: bool) -> [u16; 2] {
-    let [major, minor] = if kind == MtKind::HalfEdge { VERSION } else { VERSION_WITHOUT_HALF_EDGE };
-    [major, if has_bounds { minor } else { u16::from(has_histograms) }]
-}
-
-/// The header of a file of a version that is `total` bytes long.
-pub fn header(total: u64, version: [u16; 2], tet_errors: bool) -> [u8; HEADER_BYTES] {
+/// A header.
+pub fn header(start: Start) -> [u8; HEADER_BYTES] {
+    let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
+    let flags = flag(start.tet_errors, TET_ERRORS) | flag(start.exact, EXACT);
     let mut bytes = [0; HEADER_BYTES];
     bytes[..8].copy_from_slice(&MAGIC);
-    bytes[8..10].copy_from_slice(&version[0].to_le_bytes());
-    bytes[10..12].copy_from_slice(&version[1].to_le_bytes());
-    bytes[12..16].copy_from_slice(&(if tet_errors { TET_ERRORS } else { 0 }).to_le_bytes());
-    bytes[16..24].copy_from_slice(&total.to_le_bytes());
+    bytes[8..10].copy_from_slice(&VERSION.to_le_bytes());
+    bytes[12..16].copy_from_slice(&flags.to_le_bytes());
+    bytes[16..24].copy_from_slice(&start.total.unwrap_or(0).to_le_bytes());
     let crc = checksum::hash(&bytes[..28]);
     bytes[28..].copy_from_slice(&crc.to_le_bytes());
     bytes
@@ -65,13 +54,12 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
     if !may_be_mt(bytes) {
         return Err(FormatError::NotMt);
     }
-    let u16_at = |i: usize| u16::from_le_bytes([bytes[i], bytes[i + 1]]);
     let u32_at = |i: usize| u32_of(&bytes[i..]);
     if u32_at(28) != checksum::hash(&bytes[..28]) {
         return Err(FormatError::Corrupt { offset: 0, what: "the checksum of the header does not match" });
     }
-    let found = [u16_at(8), u16_at(10)];
-    if !(OLDEST..=VERSION[0]).contains(&found[0]) {
+    let found = u16::from_le_bytes([bytes[8], bytes[9]]);
+    if found != VERSION {
         return Err(FormatError::UnsupportedVersion { found, supported: VERSION });
     }
     let flags = u32_at(12);
@@ -82,7 +70,11 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
         });
     }
     let total = u64::from(u32_at(16)) | u64::from(u32_at(20)) << 32;
-    Ok(Start { version: found, total: (total != 0).then_some(total), tet_errors: flags & TET_ERRORS != 0 })
+    Ok(Start {
+        total: (total != 0).then_some(total),
+        tet_errors: flags & TET_ERRORS != 0,
+        exact: flags & EXACT != 0,
+    })
 }
 
 /// The first four bytes as a number. The callers have them.
@@ -107,7 +99,6 @@ impl Kind {
     pub const FLDU: Self = Self(*b"FLDU");
     pub const UPDT: Self = Self(*b"UPDT");
     pub const INSV: Self = Self(*b"INSV");
-    pub const EXPL: Self = Self(*b"EXPL");
     pub const HALF: Self = Self(*b"HALF");
     /// Exact values: those who do not know it do without.
     pub const EXACT: Self = Self(*b"fldx");
@@ -116,7 +107,7 @@ impl Kind {
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
         let head = [Self::INFO, Self::INDX, Self::HIST, Self::BOUNDS, Self::MODL, Self::BASE, Self::FLDB];
-        let blocks = [Self::UPDT, Self::HALF, Self::FLDU, Self::INSV, Self::EXPL, Self::EXACT, Self::ENDF];
+        let blocks = [Self::UPDT, Self::HALF, Self::FLDU, Self::INSV, Self::EXACT, Self::ENDF];
         head.contains(&self) || blocks.contains(&self)
     }
 

@@ -15,6 +15,7 @@ mod header;
 mod limits;
 mod payload;
 mod read;
+mod section;
 mod write;
 
 pub use decode::{DecodeOptions, Decoder, ErrorBytes, ExactStatus, Progress};

@@ -21,7 +21,7 @@ pub enum Mt {
     Vertex(VertexMt),
     /// A compact half-edge MT.
     HalfEdge(HalfEdgeMt),
-    /// An explicit MT.
+    /// An explicit MT, which no file holds.
     Explicit(ExplicitMt),
 }
 
@@ -48,24 +48,25 @@ impl Mt {
         Ok(())
     }
 
-    /// The MT, complete, with `2^bits` updates in each page: the blocks of its file. Kinds without pages only note it for that.
+    /// The MT, complete, with `2^bits` updates in each page: the blocks of its file. Kinds edge and vertex only note it for that; an explicit MT
+    /// has no file, and stays as it is.
     ///
     /// # Errors
     /// If an update is not here.
     pub fn in_pages(&self, bits: u32) -> Result<Self, UpdateError> {
         Ok(match self {
-            Self::Edge(mt) => mt.in_pages(bits)?.into(),
             Self::HalfEdge(mt) => mt.in_pages(bits)?.into(),
+            Self::Edge(mt) => {
+                let mut mt = mt.clone();
+                mt.set_page_bits(bits);
+                mt.into()
+            }
             Self::Vertex(mt) => {
                 let mut mt = mt.clone();
                 mt.set_page_bits(bits);
                 mt.into()
             }
-            Self::Explicit(mt) => {
-                let mut mt = mt.clone();
-                mt.set_page_bits(bits);
-                mt.into()
-            }
+            Self::Explicit(_) => self.clone(),
         })
     }
 }

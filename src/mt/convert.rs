@@ -21,6 +21,10 @@ impl Mt {
                 Ok(Self::HalfEdge(HalfEdgeMt::from_explicit(mt, to.usual_block_bits())?))
             }
             (Self::Explicit(mt), MtKind::Edge) => Ok(Self::Edge(EdgeMt::from_explicit(mt)?)),
+            // Both are made of vertex insertions.
+            (Self::Vertex(_), MtKind::HalfEdge) | (Self::HalfEdge(_), MtKind::Vertex) => {
+                Self::Explicit(ExplicitMt::of(self)?).convert(to)
+            }
             _ => Err(ConvertError::Kinds { from, to }),
         }
     }

@@ -194,20 +194,6 @@ pub enum PageError {
         /// Updates that it has.
         expected: u32,
     },
-    /// Another page, on which this one depends, is not here.
-    Needs {
-        /// The page.
-        page: u32,
-        /// What it depends on.
-        other: u32,
-    },
-    /// Another page that is here depends on this one.
-    Needed {
-        /// The page.
-        page: u32,
-        /// What depends on it.
-        other: u32,
-    },
     /// One of the updates cannot be stored.
     Update(UpdateError),
 }
@@ -221,10 +207,6 @@ impl fmt::Display for PageError {
             Self::Length { page, expected } => {
                 write!(f, "page {page} has {expected} updates, no other number")
             }
-            Self::Needs { page, other } => {
-                write!(f, "page {page} depends on page {other}, which is not here")
-            }
-            Self::Needed { page, other } => write!(f, "page {other} is here and depends on page {page}"),
             Self::Update(error) => error.fmt(f),
         }
     }

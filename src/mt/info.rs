@@ -14,17 +14,17 @@ pub enum MtKind {
     /// Vertex insertions whose inverse collapses a vertex onto a neighbour, stored so that any part can be read without
     /// the rest.
     HalfEdge,
-    /// Updates of any kind, every tetrahedron stored [§3].
+    /// Updates of any kind, every tetrahedron stored [§3]: in memory alone, no file has it.
     Explicit,
 }
 
 impl MtKind {
-    /// All kinds.
-    pub const ALL: [Self; 4] = [Self::HalfEdge, Self::Edge, Self::Vertex, Self::Explicit];
+    /// The kinds that files have: all but [`MtKind::Explicit`].
+    pub const OF_FILES: [Self; 3] = [Self::HalfEdge, Self::Edge, Self::Vertex];
 
     /// Whether MTs of this kind can come in pages of updates: see [`Mt::is_paged`].
     pub fn is_paged(self) -> bool {
-        matches!(self, Self::Edge | Self::HalfEdge)
+        self == Self::HalfEdge
     }
 
     /// log2 of the updates that blocks of files have unless somebody says otherwise: fewer where each can be fetched by itself.
@@ -144,7 +144,7 @@ pub struct MtInfo {
     /// all are exact.
     pub quantization: f64,
     /// The box around the reference mesh on the lattice, its least and its largest corner: all meshes of the MT are in it, and it is
-    /// as small as can be. None if that is not known, as of files of the first minor versions: see
+    /// as small as can be. None if that is not known, as of files that do not state it: see
     /// [`find_bounds`](crate::mt::Mt::find_bounds).
     pub bounds: Option<[[i32; 3]; 2]>,
 }

@@ -1,12 +1,10 @@
 //! The Multi-Tessellation itself [§2]: what it is made of and what every kind of it can do.
 //!
 //! [`EdgeMt`], [`VertexMt`] and [`HalfEdgeMt`] are the compact structures that files hold and programs use; [`ExplicitMt`]
-//! stores every tetrahedron, as the oracle of tests; [`VertexTreeMt`] has the nodes of the paper in the place of those of [`VertexMt`], to compare
+//! lives in memory alone and stores every tetrahedron, as the oracle of tests; [`VertexTreeMt`] has the nodes of the paper in the place of those of [`VertexMt`], to compare
 //! them. All are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
 //! are applied through the trait [`ApplyUpdates`].
 
-#[macro_use]
-mod pages;
 // Before `any`: then `enum_dispatch` writes the calls there, and the traits need not know [`Mt`].
 mod traits;
 
@@ -23,6 +21,7 @@ mod ids;
 mod info;
 mod margins;
 mod mesh;
+mod pages;
 mod ranks;
 mod replay;
 mod stats;

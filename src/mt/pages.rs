@@ -91,12 +91,6 @@ impl<P: Page> Pages<P> {
         Some((self.pages.get((u >> self.bits) as usize)?.as_ref()?, self.place(u)))
     }
 
-    /// [`Pages::find`] to change what takes no more and no fewer bytes then.
-    pub fn find_mut(&mut self, u: u32) -> Option<(&mut P, usize)> {
-        let place = self.place(u);
-        Some((self.pages.get_mut((u >> self.bits) as usize)?.as_mut()?, place))
-    }
-
     #[inline]
     fn place(&self, u: u32) -> usize {
         (u & ((1 << self.bits) - 1)) as usize
@@ -200,75 +194,6 @@ impl<P: Page> Pages<P> {
     }
 }
 
-/// What [`MultiTessellation`](super::MultiTessellation) says of a kind whose updates are in `self.pages`.
-macro_rules! reads_pages {
-    () => {
-        fn info(&self) -> &MtInfo {
-            &self.info
-        }
-
-        fn base(&self) -> &BaseMesh {
-            &self.base
-        }
-
-        fn updates(&self) -> u32 {
-            self.pages.updates()
-        }
-
-        #[inline]
-        fn error(&self, u: UpdateId) -> ErrorCode {
-            self.pages.error(u)
-        }
-
-        #[inline]
-        fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-            self.pages.errors(u)
-        }
-
-        fn to_come(&self) -> ErrorCode {
-            self.pages.to_come()
-        }
-
-        fn to_come_in(&self, field: usize) -> ErrorCode {
-            self.pages.to_come_in(field)
-        }
-    };
-}
-
-/// What [`UpdatePages`](super::UpdatePages) says of a kind whose updates are in `self.pages`.
-macro_rules! in_pages {
-    () => {
-        #[inline]
-        fn has(&self, u: UpdateId) -> bool {
-            self.pages.has(u)
-        }
-
-        fn present(&self) -> u32 {
-            self.pages.present()
-        }
-
-        fn set_to_come(&mut self, bounds: &[ErrorCode]) {
-            self.pages.set_to_come(bounds);
-        }
-
-        fn page_bits(&self) -> u32 {
-            self.pages.bits()
-        }
-
-        fn has_page(&self, page: u32) -> bool {
-            self.pages.get(page).is_some()
-        }
-
-        fn page_bytes(&self) -> u64 {
-            self.pages.bytes()
-        }
-
-        fn bytes_of_page(&self, page: u32) -> u64 {
-            let likely = || self.pages.updates_of(page).len() as u64 * self.update_bytes();
-            self.pages.get(page).map_or_else(likely, |page| page.bytes() as u64)
-        }
-    };
-}
 /// Lists of different lengths, one after the other.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Rows<T> {

@@ -89,7 +89,7 @@ pub trait UpdatePages: MultiTessellation {
         self.updates()
     }
 
-    /// log2 of the updates of a page, which is a block in a file. Kinds without pages only know it for their files.
+    /// log2 of the updates of a page, which is a block in a file. Kinds without pages only note it for their files.
     fn page_bits(&self) -> u32;
 
     /// The updates of page `page`, which come and go together; none if there is no such page.
@@ -109,18 +109,12 @@ pub trait UpdatePages: MultiTessellation {
     }
 
     /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
-    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction). What needs the page must have gone before: see
-    /// [`UpdatePages::needs_parents`].
+    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction). Pages are used without those on which they depend.
     ///
     /// # Errors
-    /// If the page is not here, as always for kinds without pages, or another page needs it. The MT is as it was then.
+    /// If the page is not here, as always for kinds without pages. The MT is as it was then.
     fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
         Err(PageError::Absent { page })
-    }
-
-    /// Whether a page can be used only when those on which it depends are here.
-    fn needs_parents(&self) -> bool {
-        true
     }
 
     /// Bytes of the pages that are here.

@@ -40,8 +40,8 @@ impl Front {
         }
     }
 
-    /// Registers a page that has been inserted into the MT, together with all pages on which it depends. Updates added
-    /// by `push`, after all others, need no call.
+    /// Registers a page that has been inserted into the MT. Updates added by
+    /// `push`, after all others, need no call.
     pub fn page_inserted(&mut self, mt: &impl ApplyUpdates, page: u32) {
         let (updates, known) = (mt.page_updates(page), self.known);
         self.sync(mt);

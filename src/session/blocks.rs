@@ -9,7 +9,7 @@ use super::block_state::Blocks;
 use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
 use crate::geom::Bounds;
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
-use crate::refine::{Criterion, Front, TetData};
+use crate::refine::{Criterion, Front};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -203,10 +203,9 @@ impl Session {
         }
     }
 
-    /// Puts blocks into the MT whose parents are all there.
+    /// Puts complete blocks into the MT, as far as there is memory for them.
     fn insert_waiting(&mut self) -> Result<(), FormatError> {
-        let mut next = self.next_complete();
-        while let Some(block) = next {
+        while let Some(block) = self.next_complete() {
             if !self.has_memory_for(block) {
                 self.free_memory();
             }
@@ -219,7 +218,6 @@ impl Session {
             if let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) {
                 front.page_inserted(mt, block);
             }
-            next = self.next_complete();
         }
         Ok(())
     }
@@ -230,15 +228,9 @@ impl Session {
         mt.page_bytes() + mt.bytes_of_page(block) <= blocks.memory
     }
 
-    /// A block that waits for no other one.
+    /// The first block that is complete and waits.
     fn next_complete(&self) -> Option<u32> {
-        let (blocks, index) = (self.blocks.as_ref()?, self.decoder.index()?);
-        let mt = self.decoder.mt()?;
-        let ready = |block: &u32| {
-            let parents = index.blocks.get(*block as usize).map_or(&[][..], |info| &info.parents);
-            parents.iter().all(|&parent| mt.has_page(parent))
-        };
-        blocks.waiting.numbers().map(|block| block as u32).find(ready)
+        self.blocks.as_ref()?.waiting.numbers().next().map(|block| block as u32)
     }
 
     /// How the blocks stand.
@@ -246,8 +238,7 @@ impl Session {
         let paged = self.decoder.mt().filter(|mt| mt.is_paged());
         let (Some(blocks), Some(mt)) = (&self.blocks, paged) else { return BlockProgress::default() };
         let count = self.decoder.index().map_or(0, |index| index.blocks.len() as u32);
-        // What needs no others waits for memory alone.
-        let without_memory = if mt.needs_parents() { 0 } else { blocks.waiting.len() as u32 };
+        let without_memory = blocks.waiting.len() as u32;
         BlockProgress {
             blocks: count,
             here: (0..count).filter(|&block| mt.has_page(block)).count() as u32,
@@ -277,40 +268,34 @@ impl Session {
         blocks.map(|(block, info)| MappedBlock { bounds: bounds(info.bounds), state: state(block) }).collect()
     }
 
-    /// The request is another one: works out what it needs. Where the mesh shows that, it has to move first: what a mesh that was made
-    /// for another request asks for may not be needed.
+    /// The request is another one. What it needs is worked out when the mesh has moved: what a mesh that was made for another request
+    /// asks for may not be needed.
     pub(super) fn plan_for(&mut self, criterion: Arc<dyn Criterion>) {
         if let Some(blocks) = &mut self.blocks {
             blocks.criterion = Some(criterion);
-            if self.decoder.mt().is_none_or(Mt::needs_parents) {
-                self.plan();
-            }
         }
     }
 
     /// Works out which blocks the request needs.
     fn plan(&mut self) {
         let (Some(blocks), Some(index)) = (&mut self.blocks, self.decoder.index()) else { return };
-        let (Some(mt), Some(criterion)) = (self.decoder.mt(), &blocks.criterion) else { return };
+        let (Some(mt), Some(criterion), Some(front)) = (self.decoder.mt(), &blocks.criterion, &self.front)
+        else {
+            return;
+        };
         blocks.plans += 1;
         blocks.last_needed.resize(index.blocks.len(), 0);
         let fields = self.decoder.wanted_fields();
-        let mut plan = match &self.front {
-            Some(front) if !mt.needs_parents() => plan_by_mesh(front, mt, &**criterion, index, fields),
-            _ => plan_by_index(mt, &**criterion, index, fields),
-        };
+        let mut plan = plan_by_mesh(front, mt, &**criterion, index, fields);
         plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
-        // What a block depends on is as important and has a smaller number.
+        // The most important ones first; those as important as they are in the file.
         plan.sort_by(|(priority, block), (other, after)| other.total_cmp(priority).then(block.cmp(after)));
         blocks.needed = plan.len() as u32;
         // Pages with applied updates do not go: what comes has to fit beside them.
-        let mut taken = match &self.front {
-            Some(front) if !mt.needs_parents() => (0..index.blocks.len() as u32)
-                .filter(|&block| mt.has_page(block) && is_in_use(front, index, mt, block))
-                .map(|block| mt.bytes_of_page(block))
-                .sum(),
-            _ => 0,
-        };
+        let mut taken: u64 = (0..index.blocks.len() as u32)
+            .filter(|&block| mt.has_page(block) && is_in_use(front, index, mt, block))
+            .map(|block| mt.bytes_of_page(block))
+            .sum();
         let memory = blocks.memory;
         plan.retain(|&(_, block)| {
             taken += mt.bytes_of_page(block);
@@ -327,10 +312,8 @@ impl Session {
     /// The mesh has moved: what it does not need any more may go, and what waited for that may come.
     pub(super) fn after_step(&mut self) -> Result<(), FormatError> {
         if self.blocks.is_some() {
-            if self.decoder.mt().is_some_and(|mt| !mt.needs_parents()) {
-                // The mesh shows now what else it needs.
-                self.plan();
-            }
+            // The mesh shows now what else it needs.
+            self.plan();
             self.free_memory();
             self.insert_waiting()?;
         }
@@ -351,8 +334,7 @@ impl Session {
         }
     }
 
-    /// As many blocks as have to go, children before parents, those first that have not been needed for longest. Those of which an
-    /// update is applied stay, and those on which these depend.
+    /// As many blocks as have to go, those first that have not been needed for longest. Those of which an update is applied stay.
     fn blocks_to_drop(&self) -> Vec<u32> {
         let mut leaving = Vec::new();
         let (Some(blocks), Some(mt), Some(index)) = (&self.blocks, self.decoder.mt(), self.decoder.index())
@@ -365,27 +347,15 @@ impl Session {
         if excess == 0 {
             return leaving;
         }
-        let candidates = self.unneeded(blocks, mt, index);
-        let mut dependents = vec![0_u32; index.blocks.len()];
-        let here = (0..).zip(&index.blocks).filter(|(block, _)| mt.has_page(*block));
-        here.flat_map(|(_, info)| &info.parents).for_each(|&parent| dependents[parent as usize] += 1);
-        // Parents may be older than their children: then they are looked at again when these are gone.
-        let mut is_moving = true;
-        while excess > 0 && is_moving {
-            is_moving = false;
-            for &block in &candidates {
-                if excess == 0 || dependents[block as usize] > 0 || leaving.contains(&block) {
-                    continue;
-                }
-                if self.front.as_ref().is_some_and(|front| is_in_use(front, index, mt, block)) {
-                    continue;
-                }
-                excess = excess.saturating_sub(mt.bytes_of_page(block));
-                let parents = &index.blocks[block as usize].parents;
-                parents.iter().for_each(|&parent| dependents[parent as usize] -= 1);
-                leaving.push(block);
-                is_moving = true;
+        for block in self.unneeded(blocks, mt, index) {
+            if excess == 0 {
+                break;
             }
+            if self.front.as_ref().is_some_and(|front| is_in_use(front, index, mt, block)) {
+                continue;
+            }
+            excess = excess.saturating_sub(mt.bytes_of_page(block));
+            leaving.push(block);
         }
         leaving
     }
@@ -394,15 +364,15 @@ impl Session {
     fn unneeded(&self, blocks: &Blocks, mt: &Mt, index: &Index) -> Vec<u32> {
         let mut is_needed = vec![false; index.blocks.len()];
         blocks.plan.iter().for_each(|&(_, block)| is_needed[block as usize] = true);
-        // Pages that come without their parents are asked for one by one; what they have shown must not be forgotten.
-        if let (Some(front), Some(criterion), false) = (&self.front, &blocks.criterion, mt.needs_parents()) {
+        // Blocks are asked for one by one; what they have shown must not be forgotten.
+        if let (Some(front), Some(criterion)) = (&self.front, &blocks.criterion) {
             let fields = self.decoder.wanted_fields();
             let bounds = |page: u32| errors_of(index, fields, page);
             let telling = front.decisive_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
             telling.into_iter().for_each(|block| is_needed[block as usize] = true);
         }
         let here = (0..index.blocks.len() as u32).filter(|&block| mt.has_page(block));
-        // Of the same age, children before parents.
+        // Of the same age, the last ones of the file first.
         let age = |block: u32| blocks.last_needed.get(block as usize).copied().unwrap_or(0);
         let unneeded = here.filter(|&block| !is_needed[block as usize]);
         let mut keys: Vec<u64> =
@@ -429,28 +399,6 @@ fn priority(excess: f64, errors: &[ErrorCode], bytes: u64) -> f64 {
     let largest = errors.iter().copied().max().unwrap_or(ErrorCode::ZERO).error();
     let gain = if excess.is_finite() { excess } else { largest.max(f64::MIN_POSITIVE) };
     gain / bytes as f64
-}
-
-/// The blocks in whose boxes something may violate the request, and those that they depend on.
-fn plan_by_index(mt: &Mt, criterion: &dyn Criterion, index: &Index, fields: &[usize]) -> Vec<(f64, u32)> {
-    let count = index.blocks.len();
-    let mut priorities: Vec<f64> = vec![0.0; count];
-    for at in (0..count).rev() {
-        let info = &index.blocks[at];
-        let errors = errors_of(index, fields, at as u32);
-        let ranges: Vec<[i32; 2]> = fields.iter().map(|&f| info.ranges[f]).collect();
-        let first = index.updates(at as u32, mt.info().updates).start;
-        let excess = excess(criterion, info.bounds, &errors, &ranges, first);
-        if excess > 1.0 {
-            priorities[at] = priorities[at].max(priority(excess, &errors, info.len()));
-        }
-        if priorities[at] > 0.0 {
-            for &parent in &info.parents {
-                priorities[parent as usize] = priorities[parent as usize].max(priorities[at]);
-            }
-        }
-    }
-    (0..).zip(&priorities).filter(|(_, p)| **p > 0.0).map(|(block, &p)| (p, block)).collect()
 }
 
 /// The blocks that are here and in use, and those that hold what tetrahedra of the mesh ask for.
@@ -483,34 +431,4 @@ fn plan_by_mesh(
             (priority(excess, &errors_of(index, fields, block), index.blocks[block as usize].len()), block)
         })
         .collect()
-}
-
-/// How often the error in a block exceeds what is wanted, at most: that of a box full of the worst that the block holds.
-fn excess(
-    criterion: &dyn Criterion,
-    [low, high]: [[i32; 3]; 2],
-    errors: &[ErrorCode],
-    ranges: &[[i32; 2]],
-    first: u32,
-) -> f64 {
-    let error = errors.iter().copied().max().unwrap_or(ErrorCode::ZERO);
-    let corner =
-        |bits: usize| [0, 1, 2].map(|axis| if bits >> axis & 1 == 0 { low[axis] } else { high[axis] });
-    // Every other corner has the least and the largest level, so that each tetrahedron has both.
-    let levels = |field: usize| {
-        let [low, high] = ranges.get(field).copied().unwrap_or_default();
-        [low, high, low, high]
-    };
-    // The six tetrahedra around the diagonal of the box (Kuhn 1960).
-    let mut largest = 0.0_f64;
-    for [a, b] in [[0, 1], [1, 2], [2, 0], [0, 2], [2, 1], [1, 0]] {
-        let path = [0, 1 << a, 1 << a | 1 << b, 7];
-        // Three of the paths turn left and three right; tetrahedra are positive.
-        let is_even = (b + 3 - a) % 3 == 1;
-        let corners = if is_even { path } else { [path[0], path[1], path[3], path[2]] }.map(corner);
-        let update = UpdateId(first);
-        let look = TetData { corners: &corners, levels: &levels, error, errors, update };
-        largest = largest.max(criterion.rank(&look).excess);
-    }
-    largest
 }

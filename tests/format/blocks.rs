@@ -1,12 +1,14 @@
-//! Promise: the index of a file tells the truth, and is small; blocks come in any order that keeps what they depend on, and
-//! make the MT that the stream makes; one that is damaged changes nothing.
+//! Promise: the index of a half-edge file tells the truth, and is small; blocks come in any order, and make the MT that the stream
+//! makes; one that is damaged changes nothing. Files of other kinds have neither index nor such blocks.
 
-use crate::support::files::{bytes_in_blocks, coded, inserted, options, sample, samples, sections, spelled};
+use crate::support::files::{
+    assemble, bytes_in_blocks, coded, decode, half_edge, inserted, sample, sections,
+};
 use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, FormatError, encode};
 use tetralod::mt::{
-    Applied, ApplyUpdates, CurrentMesh, Mt, MtKind, MultiTessellation, PageError, UpdateId, UpdatePages,
+    Applied, ApplyUpdates, CurrentMesh, Mt, MultiTessellation, PageError, UpdateId, UpdatePages,
 };
 
 /// A decoder of blocks: it has what comes before the first one.
@@ -27,16 +29,11 @@ fn block_bytes(decoder: &Decoder, bytes: &[u8], block: u32) -> Vec<u8> {
     ranges.iter().flat_map(|range| &bytes[range.start as usize..range.end as usize]).copied().collect()
 }
 
-fn parents(decoder: &Decoder, block: u32) -> Vec<u32> {
-    decoder.index().map(|index| index.blocks[block as usize].parents.clone()).expect("an index")
-}
-
-/// Every tetrahedron that an update of a block removes or inserts lies within what the index tells of the block, and was
-/// created in it or in a parent.
+/// Every tetrahedron that an update of a block removes or inserts lies within what the index tells of the block.
 #[test]
 fn the_index_tells_the_truth() {
-    for mt in [sample(3, 300), spelled(2, 300), inserted(2, 2, 300)] {
-        let bytes = bytes_in_blocks(&mt, 4);
+    for fields in [1, 3] {
+        let bytes = bytes_in_blocks(&half_edge(2, fields, 300), 4);
         let mut decoder = Decoder::default();
         decoder.feed(&bytes).expect("a good file");
         let index = decoder.index().expect("an index").clone();
@@ -45,16 +42,11 @@ fn the_index_tells_the_truth() {
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.updates_arrived(&mut mesh, 0);
         for u in (0..mt.updates()).map(UpdateId) {
-            let block = u.0 >> 4;
-            let info = &index.blocks[block as usize];
+            let info = &index.blocks[u.0 as usize >> 4];
             let largest = (0..mt.info().fields.len()).all(|f| mt.error_of_field(u, f) <= info.errors[f]);
             assert!(largest, "{u:?}");
             let mut tets = Vec::new();
             mt.find_removed(&mut mesh, u, &mut tets).expect("a valid MT");
-            for creator in tets.iter().filter_map(|&t| mt.creator(&mesh, t)) {
-                let other = creator.0 >> 4;
-                assert!(other == block || info.parents.contains(&other), "{u:?} needs block {other}");
-            }
             let inside = |mesh: &CurrentMesh, tets: &[u32]| {
                 tets.iter().filter_map(|&t| mesh.tet(t)).flatten().all(|v| {
                     let p = mesh.positions()[v as usize];
@@ -69,34 +61,30 @@ fn the_index_tells_the_truth() {
             mt.find_inserted(&mut mesh, u, &mut tets).expect("a valid MT");
             assert!(inside(&mesh, &tets), "{u:?}");
         }
-        for (at, info) in (0..).zip(&index.blocks) {
-            assert!(info.parents.is_sorted() && info.parents.iter().all(|&parent| parent < at));
-        }
     }
 }
 
 #[test]
 fn the_index_tells_where_blocks_are() {
-    for mt in samples(2, 300) {
-        let bytes = bytes_in_blocks(&mt, 4);
-        let decoder = opened(&bytes, &[]);
-        let mut at = None;
-        for block in 0..19 {
-            let ranges = decoder.block_ranges(block);
-            assert_eq!(ranges.len(), 1);
-            assert!(at.is_none_or(|at| at == ranges[0].start));
-            at = Some(ranges[0].end);
-        }
-        assert_eq!(at, Some(bytes.len() as u64 - 24), "the end follows");
-        assert!(decoder.block_ranges(19).is_empty());
+    let bytes = bytes_in_blocks(&half_edge(2, 2, 300), 4);
+    let decoder = opened(&bytes, &[]);
+    let mut at = None;
+    for block in 0..19 {
+        let ranges = decoder.block_ranges(block);
+        assert_eq!(ranges.len(), 1);
+        assert!(at.is_none_or(|at| at == ranges[0].start));
+        at = Some(ranges[0].end);
     }
+    assert_eq!(at, Some(bytes.len() as u64 - 24), "the end follows");
+    assert!(decoder.block_ranges(19).is_empty());
 }
 
 #[test]
 fn header_and_index_are_small() {
     use tetralod_build::{BuildConfig, build};
     let mesh = tetralod_io::generate::bucky(33).expect("a size that is allowed");
-    let built = build(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a good mesh");
+    let config = BuildConfig { block_bits: 11, ..BuildConfig::default() };
+    let built = build(&mesh, &config).expect("a good mesh");
     let bytes = encode(&built.mt, &EncodeOptions::default()).expect("complete");
     let sections = sections(&bytes);
     assert_eq!([sections[0].0, sections[1].0], [*b"INFO", *b"INDX"]);
@@ -106,7 +94,7 @@ fn header_and_index_are_small() {
 
 #[test]
 fn blocks_in_any_order_make_the_mt_of_the_stream() {
-    let mt = sample(2, 300);
+    let mt = half_edge(2, 2, 300);
     let bytes = bytes_in_blocks(&mt, 4);
     let mut whole = Decoder::default();
     whole.feed(&bytes).expect("a good file");
@@ -115,16 +103,12 @@ fn blocks_in_any_order_make_the_mt_of_the_stream() {
         let mut decoder = opened(&bytes, &[]);
         let mut here = BTreeSet::new();
         while here.len() < 19 {
-            let ready = |block: &u32| {
-                !here.contains(block) && parents(&decoder, *block).iter().all(|p| here.contains(p))
-            };
-            let ready: Vec<u32> = (0..19).filter(ready).collect();
+            let ready: Vec<u32> = (0..19).filter(|block| !here.contains(block)).collect();
             let block = ready[random.below(ready.len())];
             if random.once_in(3) {
                 let gone = here.iter().copied().nth(random.below(here.len().max(1)));
-                let free = |b: &u32| !here.iter().any(|other| parents(&decoder, *other).contains(b));
-                if let Some(gone) = gone.filter(free) {
-                    decoder.drop_block(gone).expect("nothing depends on it");
+                if let Some(gone) = gone {
+                    decoder.drop_block(gone).expect("it is there");
                     here.remove(&gone);
                     continue;
                 }
@@ -136,53 +120,23 @@ fn blocks_in_any_order_make_the_mt_of_the_stream() {
     }
 }
 
-/// The blocks that a block depends on, directly or not.
-fn ancestors(decoder: &Decoder, block: u32) -> Vec<u32> {
-    let mut all = Vec::from_iter(parents(decoder, block));
-    let mut at = 0;
-    while at < all.len() {
-        let more = parents(decoder, all[at]);
-        all.extend(more);
-        at += 1;
-    }
-    all
-}
-
 #[test]
-fn a_block_before_its_parents_or_twice_is_refused() {
-    let bytes = bytes_in_blocks(&sample(1, 300), 4);
+fn a_block_that_comes_twice_or_is_not_there_is_refused() {
+    let bytes = bytes_in_blocks(&half_edge(2, 1, 300), 4);
     let mut decoder = opened(&bytes, &[]);
-    // From the first block on, the index says what errors are to come.
-    decoder.take_block(0, &block_bytes(&decoder, &bytes, 0)).expect("it depends on nothing");
-    decoder.drop_block(0).expect("it is there");
+    decoder.take_block(7, &block_bytes(&decoder, &bytes, 7)).expect("a good block");
     let before = decoder.mt().cloned();
-    let mut refused = 0;
-    for block in 0..19 {
-        let vertices_from = decoder.take_block(block, &block_bytes(&decoder, &bytes, block));
-        match vertices_from {
-            Ok(()) => decoder.drop_block(block).expect("it is there"),
-            Err(FormatError::Page(PageError::Needs { other, .. })) => {
-                assert!(ancestors(&decoder, block).contains(&other));
-                refused += 1;
-            }
-            // What the offset above is cannot be known without the block that has it.
-            Err(FormatError::Corrupt { .. } | FormatError::Update(_)) => refused += 1,
-            Err(error) => panic!("{error:?}"),
-        }
-        assert!(decoder.mt() == before.as_ref(), "block {block}");
-    }
-    assert!(refused > 0);
-    decoder.take_block(0, &block_bytes(&decoder, &bytes, 0)).expect("it depends on nothing");
-    let again = decoder.take_block(0, &block_bytes(&decoder, &bytes, 0));
-    assert!(matches!(again, Err(FormatError::Page(PageError::Present { page: 0 }))), "{again:?}");
+    let again = decoder.take_block(7, &block_bytes(&decoder, &bytes, 7));
+    assert!(matches!(again, Err(FormatError::Page(PageError::Present { page: 7 }))), "{again:?}");
     let beyond = decoder.take_block(19, &[]);
     assert!(matches!(beyond, Err(FormatError::Corrupt { .. })), "{beyond:?}");
-    assert!(decoder.drop_block(7).is_err());
+    assert_eq!(decoder.drop_block(8), Err(PageError::Absent { page: 8 }));
+    assert!(decoder.mt() == before.as_ref(), "nothing has changed");
 }
 
 #[test]
 fn a_damaged_block_changes_nothing() {
-    let bytes = bytes_in_blocks(&sample(2, 60), 4);
+    let bytes = bytes_in_blocks(&half_edge(1, 2, 60), 4);
     let mut decoder = opened(&bytes, &[]);
     for block in 0..4 {
         let good = block_bytes(&decoder, &bytes, block);
@@ -216,7 +170,7 @@ fn told(mt: &Mt, fields: &[usize]) -> Vec<([i32; 3], Vec<i32>)> {
 
 #[test]
 fn some_fields_have_the_same_levels_as_all() {
-    let mt = sample(3, 300);
+    let mt = half_edge(2, 3, 300);
     let bytes = bytes_in_blocks(&mt, 4);
     let whole = coded(&mt);
     let name = |f: usize| mt.info().fields[f].name.as_str();
@@ -252,12 +206,19 @@ fn some_fields_have_the_same_levels_as_all() {
 }
 
 #[test]
-fn other_kinds_have_an_index_but_no_blocks_to_take() {
-    let bytes = bytes_in_blocks(&spelled(1, 60), 4);
-    let mut decoder = opened(&bytes, &[]);
-    assert_eq!(decoder.info().map(|info| info.kind), Some(MtKind::Explicit));
-    let block = block_bytes(&decoder, &bytes, 0);
-    assert!(matches!(decoder.take_block(0, &block), Err(FormatError::Corrupt { .. })));
-    assert!(decoder.drop_block(0).is_err());
-    assert!(encode(&sample(1, 60), &options()).is_ok());
+fn other_kinds_have_neither_index_nor_blocks_to_take() {
+    for mt in [sample(1, 60), inserted(1, 1, 60)] {
+        let bytes = bytes_in_blocks(&mt, 4);
+        let mut decoder = opened(&bytes, &[]);
+        assert_eq!(decoder.info(), Some(mt.info()));
+        assert!(!decoder.takes_blocks() && decoder.index().is_none() && decoder.block_ranges(0).is_empty());
+        assert!(matches!(decoder.take_block(0, &[]), Err(FormatError::Corrupt { .. })));
+        assert!(decoder.drop_block(0).is_err());
+        // An index in such a file is out of place.
+        let indexed = sections(&bytes_in_blocks(&half_edge(1, 1, 60), 4));
+        let mut sections = sections(&bytes);
+        sections.insert(1, indexed[1].clone());
+        let refused = decode(&assemble(&sections, 60));
+        assert!(matches!(refused, Err(FormatError::Corrupt { .. })), "{:?}", refused.err());
+    }
 }

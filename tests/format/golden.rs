@@ -1,5 +1,5 @@
-//! Promise: versions 2 and 3 of the format do not change. What these small MTs are written as, byte for byte, is kept in
-//! `tests/golden`, and is read back; files of other versions are told apart.
+//! Promise: version 1 of the format does not change. What these small MTs are written as, byte for byte, is kept in
+//! `tests/golden`, one for each kind, and is read back; files of other versions are told apart.
 
 use crate::support::files::{assert_same, decode, field, header, small_info};
 use std::fmt::Write;
@@ -83,10 +83,9 @@ fn text_of(bytes: &[u8]) -> String {
 #[test]
 fn the_examples_are_written_and_read_as_ever() {
     let examples = [
-        (edge_example(), include_str!("../golden/v2-edge.hex")),
-        (explicit_example(), include_str!("../golden/v2-explicit.hex")),
-        (vertex_example(), include_str!("../golden/v2-vertex.hex")),
-        (half_edge_example(), include_str!("../golden/v3-half-edge.hex")),
+        (edge_example(), include_str!("../golden/edge.hex")),
+        (vertex_example(), include_str!("../golden/vertex.hex")),
+        (half_edge_example(), include_str!("../golden/half-edge.hex")),
     ];
     let mut changes = String::new();
     for (mt, golden) in examples {
@@ -102,19 +101,17 @@ fn the_examples_are_written_and_read_as_ever() {
 }
 
 #[test]
-fn a_half_edge_mt_in_a_file_of_version_2_is_refused() {
-    let mut bytes = bytes_of(include_str!("../golden/v3-half-edge.hex"));
+fn other_versions_are_told_apart() {
+    let mut bytes = bytes_of(include_str!("../golden/half-edge.hex"));
     let total = bytes.len() as u64;
-    bytes[..32].copy_from_slice(&header([2, 0], 0, total));
-    let what = "the version of the file does not go with the kind of MT in it";
-    assert_eq!(decode(&bytes).expect_err("an older version"), FormatError::Corrupt { offset: 8, what });
-}
-
-#[test]
-fn files_of_the_first_version_are_told_apart() {
-    let found = decode(&bytes_of(include_str!("../golden/v1-edge.hex")));
-    let error = found.expect_err("version 1 is no longer read");
-    assert_eq!(error, FormatError::UnsupportedVersion { found: [1, 0], supported: [3, 2] });
-    let text = error.to_string();
-    assert!(text.contains("1.0") && text.contains("build the file again"), "{text}");
+    for found in [0, 2, 3] {
+        bytes[..32].copy_from_slice(&header(found, 0, total));
+        let error = decode(&bytes).expect_err("only version 1 is read");
+        assert_eq!(error, FormatError::UnsupportedVersion { found, supported: 1 });
+        let text = error.to_string();
+        assert!(
+            text.contains(&format!("version {found},")) && text.contains("build the file again"),
+            "{text}"
+        );
+    }
 }

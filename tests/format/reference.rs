@@ -7,9 +7,9 @@ use crate::support::builder::{Plan, build, mt_of_splits};
 use crate::support::domains::{Domain, PlainMesh};
 use crate::support::files::{encoded, field, in_blocks, small_info};
 use crate::support::random::Random;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
-use tetralod::format::{Decoder, EncodeOptions, Index};
+use tetralod::format::{Decoder, EncodeOptions};
 use tetralod::geom::Lattice;
 use tetralod::mesh::{Field, TetMesh, VectorPart};
 use tetralod::mt::{
@@ -31,36 +31,27 @@ fn file_of(mt: &(impl Clone + Into<Mt>), block_bits: u32) -> Vec<u8> {
 
 /// Reads a file both ways, block by block.
 fn compare(bytes: &[u8]) {
-    let mut random = Random::new(7);
-    let file = reader::read(bytes, |ready| ready[random.below(ready.len())]);
+    let file = reader::read(bytes);
     let mut decoder = Decoder::default();
     let front = file.blocks.first().map_or(bytes.len(), |range| range.start);
     decoder.feed(&bytes[..front]).expect("a good file");
     compare_info(&file, decoder.info().expect("a description"), decoder.metadata());
-    compare_index(&file, decoder.index().expect("an index"), &decoder);
+    assert_eq!(decoder.index(), None);
     let mut current = compare_base(&file, edge_of(&decoder));
     let mut mesh = plain::Mesh::new(&file);
-    let mut creators: HashMap<[u32; 4], u32> = HashMap::new();
     for (block, range) in (0..).zip(&file.blocks) {
         decoder.feed(&bytes[range.clone()]).expect("a good file");
         let mt = edge_of(&decoder);
-        let updates = file.index.updates(block, &file.info);
+        let updates = file.updates(block);
         assert_eq!(mt.updates(), updates.end);
         mt.updates_arrived(&mut current, updates.start);
-        let mut parents = BTreeSet::new();
         for k in updates {
             compare_split(&file, mt, k);
             assert_eq!(mt.refine(&mut current, UpdateId(k)), Ok(Applied::Done));
-            let [removed, inserted] = mesh.split(&file, k);
-            parents.extend(
-                removed.iter().filter_map(|tet| creators.get(&sorted(*tet))).map(|&u| file.block_of(u)),
-            );
-            creators.extend(inserted.iter().map(|tet| (sorted(*tet), k)));
-            check_entry(&file, &mesh, k, &[removed, inserted].concat());
+            mesh.split(&file, k);
             mesh.forget(file.splits[&k].vertex);
         }
-        parents.remove(&block);
-        assert!(parents.iter().eq(&file.index.blocks[block as usize].parents));
+        check_behind(&file, mt, block);
         compare_meshes(&mesh, &current);
     }
     let behind = file.blocks.last().map_or(front, |range| range.end);
@@ -109,21 +100,6 @@ fn compare_info(file: &File, info: &MtInfo, metadata: &[(String, String)]) {
     assert_eq!(file.info.metadata, metadata);
 }
 
-fn compare_index(file: &File, index: &Index, decoder: &Decoder) {
-    assert_eq!((file.index.block_bits, file.index.between), (index.block_bits, index.shared));
-    assert_eq!(file.index.blocks.len(), index.blocks.len());
-    for (block, (ours, theirs)) in (0..).zip(file.index.blocks.iter().zip(&index.blocks)) {
-        assert_eq!((&ours.lengths, &ours.parents), (&theirs.lengths, &theirs.parents));
-        for (axis, bounds) in ours.bounds.iter().enumerate() {
-            assert_eq!(*bounds, [0, 1].map(|end| theirs.bounds[end][axis] as u64));
-        }
-        let fields = theirs.errors.iter().zip(&theirs.ranges);
-        assert!(ours.fields.iter().copied().eq(fields.map(|(e, range)| (e.0, range.map(|x| x as u64)))));
-        let range = file.blocks[block as usize].start as u64..file.blocks[block as usize].end as u64;
-        assert_eq!(decoder.block_ranges(block), vec![range]);
-    }
-}
-
 fn compare_base(file: &File, mt: &EdgeMt) -> CurrentMesh {
     assert_eq!(file.base.positions, mt.base().positions);
     assert_eq!(file.base.tets, mt.base().tets);
@@ -145,19 +121,17 @@ fn compare_split(file: &File, mt: &EdgeMt, k: u32) {
     assert!(ours.errors.iter().eq(theirs.errors.iter().map(|error| &error.0)));
 }
 
-/// Checks what the index says of an update and all tetrahedra that it changes.
-fn check_entry(file: &File, mesh: &plain::Mesh, k: u32, changed: &[[u32; 4]]) {
-    let entry = &file.index.blocks[file.block_of(k) as usize];
-    for v in changed.as_flattened() {
-        for (x, [low, high]) in mesh.positions[v].iter().zip(entry.bounds) {
-            assert!((low..=high).contains(&(*x as u64)));
-        }
-        for (level, (_, [low, high])) in mesh.levels[v].iter().zip(&entry.fields) {
-            assert!((*low..=*high).contains(&(*level as u64)));
-        }
-    }
-    for (error, (largest, _)) in file.splits[&k].errors.iter().zip(&entry.fields) {
-        assert!(error <= largest);
+/// Checks what a block says of the errors of the updates behind it.
+fn check_behind(file: &File, mt: &EdgeMt, block: u32) {
+    let behind = file.updates(block).end..file.info.updates;
+    for (field, &bound) in file.behind[block as usize].iter().enumerate() {
+        let errors = behind.clone().map(|k| file.splits[&k].errors[field]);
+        assert!(errors.clone().all(|error| error <= bound));
+        // It is the least one that fits its byte.
+        let largest = errors.max().unwrap_or(0);
+        assert!(bound == u16::MAX || u32::from(bound) < u32::from(largest) + 256);
+        let known = if behind.is_empty() { ErrorCode::ZERO } else { ErrorCode(bound) };
+        assert_eq!(mt.to_come_in(field), known);
     }
 }
 
@@ -190,7 +164,7 @@ fn updates_in_another_order_make_the_same_mesh() {
     let mut random = Random::new(5);
     let built = build(Plan { domain: Domain::Cube(3), seed: 9, fields: 2, updates: 1000 });
     let bytes = file_of(&built.edge_mt(), 4);
-    let file = reader::read(&bytes, |ready| ready[0]);
+    let file = reader::read(&bytes);
     let in_order = refined(&file, |ready| ready[0]);
     for _ in 0..3 {
         let other = refined(&file, |ready| ready[random.below(ready.len())]);
@@ -275,7 +249,7 @@ fn exact_values_are_read_alike() {
     let options = EncodeOptions { exact: built.exact.clone(), ..options() };
     let bytes = encoded(&in_blocks(&built.mt, 5), &options).expect("an MT");
     compare(&bytes);
-    let file = reader::read(&bytes, |ready| ready[0]);
+    let file = reader::read(&bytes);
     let mesh = refined(&file, |ready| ready[0]);
     for (ours, theirs) in file.exact.iter().zip(&built.exact) {
         let field = &file.info.fields[ours.field as usize];
@@ -450,7 +424,7 @@ fn example() -> Vec<u8> {
 #[test]
 fn a_changed_formula_would_be_noticed() {
     let mt = built(&generate::bucky(7).expect("a small size"), BuildConfig::of(MtKind::Edge));
-    let mut file = reader::read(&file_of(&mt, 6), |ready| ready[0]);
+    let mut file = reader::read(&file_of(&mt, 6));
     let right = refined(&file, |ready| ready[0]);
     let wrong_levels = file.splits.values().filter(|split| split.residuals != [0]).count();
     let wrong_sides = file.splits.values().filter(|split| split.mask != 0).count();

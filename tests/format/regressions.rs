@@ -4,7 +4,7 @@
 #[path = "../../fuzz/src/exercise.rs"]
 mod exercise;
 
-use crate::support::files::{assemble, bytes_in_blocks, inserted, sample, sections};
+use crate::support::files::{assemble, bytes_in_blocks, half_edge, inserted, sample, sections};
 use std::fs;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn no_finding_comes_back() {
 #[test]
 fn good_files_pass() {
     let script = [0, 1, 2, 3, 60, 5, 36, 97, 200, 66, 10, 11, 193, 13, 74, 15];
-    for mt in [sample(2, 60), inserted(2, 1, 60)] {
+    for mt in [sample(2, 60), inserted(2, 1, 60), half_edge(2, 1, 60)] {
         let file = bytes_in_blocks(&mt, 4);
         assert_eq!(exercise::repaired(&file), file);
         let input = [&script[..], &file].concat();

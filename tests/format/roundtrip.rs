@@ -2,15 +2,15 @@
 
 use crate::support::files::{
     assert_same, bytes_in_blocks, bytes_of, coded, decode, encoded, in_blocks, inserted, options, planned,
-    sample, samples, spelled,
+    sample, samples,
 };
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use tetralod::format::{Decoder, EncodeError, EncodeOptions, encode_to};
 use tetralod::geom::WIDE_BITS;
 use tetralod::mt::{
-    ApplyUpdates, EdgeMt, EdgeUpdate, ExplicitMt, Mt, MtInfo, MtKind, MultiTessellation, UpdateError,
-    UpdateId, UpdatePages,
+    ApplyUpdates, EdgeMt, EdgeUpdate, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateError, UpdateId,
+    UpdatePages,
 };
 use tetralod_build::{BuildConfig, build};
 use tetralod_io::generate;
@@ -22,10 +22,8 @@ fn comes_back(mt: &Mt, block_bits: u32) {
     assert_same(mt, &found);
     assert!(bytes_in_blocks(mt, block_bits) == bytes, "other bytes for the same MT");
     assert!(bytes_in_blocks(&found, block_bits) == bytes, "other bytes for what was read");
-    if !matches!(mt, Mt::Edge(_)) {
-        let paged = mt.in_pages(block_bits).expect("a complete MT");
-        assert!(found == paged, "these kinds come back as they were");
-    }
+    let paged = mt.in_pages(block_bits).expect("a complete MT");
+    assert!(found == paged, "it comes back as it was");
 }
 
 proptest! {
@@ -33,9 +31,7 @@ proptest! {
 
     #[test]
     fn any_mt_comes_back(plan in plan(4, 2, 0..80), block_bits in 4..8_u32) {
-        let mt = Mt::from(planned(plan));
-        comes_back(&mt, block_bits);
-        comes_back(&mt.convert(MtKind::Explicit).expect("a valid MT"), block_bits);
+        comes_back(&Mt::from(planned(plan)), block_bits);
     }
 
     #[test]
@@ -102,21 +98,19 @@ fn what_could_not_be_read_back_is_not_written() {
     let miscounted = EdgeMt::new(miscounted, whole.base().clone());
     assert!(matches!(encoded(&miscounted, &plain), Err(EncodeError::Base(_))));
 
-    let spelled = spelled(1, 5);
-    let spelled_in = |bits| spelled.clone().in_pages(bits).expect("a complete MT");
-    let other = MtInfo { updates: 0, ..spelled.info().clone() };
-    let other = ExplicitMt::new(other, MultiTessellation::base(&spelled).clone());
-    assert!(matches!(encoded(&other, &plain), Err(EncodeError::Base(_))));
+    let spelled = ExplicitMt::of(&whole).expect("a valid MT");
+    let refused = encoded(&spelled, &plain);
+    assert!(matches!(refused, Err(EncodeError::Kind { kind: MtKind::Explicit })), "{refused:?}");
 
     let metadata = [("key".to_owned(), "x".repeat(70_000))].into();
     let wordy = EncodeOptions { metadata, ..plain.clone() };
     assert!(matches!(encoded(&whole, &wordy), Err(EncodeError::TooLong { .. })));
 
     for page_bits in [0, 3, 17, 32, u32::MAX] {
-        let odd = spelled_in(page_bits);
+        let odd = inserted(1, 1, 5).in_pages(page_bits).expect("a complete MT");
         assert!(matches!(encoded(&odd, &plain), Err(EncodeError::Blocks { bits }) if bits == page_bits));
     }
-    let small = whole.in_pages(3).expect("a complete MT");
+    let small = Mt::from(whole.clone()).in_pages(3).expect("a complete MT");
     assert!(matches!(encoded(&small, &plain), Err(EncodeError::Blocks { bits: 3 })));
 
     // Updates that no mesh takes: all goes to one side, and more than there is.

@@ -270,7 +270,6 @@ test("the forecast is not less than the memory that was used, and not much more"
     ["blocks-half-edge.vti", {}],
     ["blocks-half-edge.vti", { kind: "edge" }],
     ["small.vti", { kind: "vertex" }],
-    ["small.vti", { kind: "explicit" }],
     ["small.vti", { method: "insert" }],
     ["fields.vtu", { allFields: true }],
     ["fields.vtu", { allFields: true, kind: "edge" }],

@@ -9,7 +9,7 @@ const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test e2e`");
 
 /** Files of the fixture, and what native code makes of them. */
-const FILES = { "small.mt": "hashes.json", "small-edge.mt": "hashes-edge.json", "small-vertex.mt": "hashes-vertex.json", "small-explicit.mt": "hashes-explicit.json" };
+const FILES = { "small.mt": "hashes.json", "small-edge.mt": "hashes-edge.json", "small-vertex.mt": "hashes-vertex.json" };
 
 const PAGE = `<!doctype html><script type="importmap">
   { "imports": { "tetralod": "/pkg/index.js", "tetralod/viewer": "/pkg/viewer.js", "tetralod/inline": "/pkg/inline.js" } }

@@ -31,7 +31,7 @@ function gridFile(n) {
 }
 
 test("a dropped VTU is built and shown, a broken file leaves all as it is", async () => {
-  const page = await open("data/bucky-explicit.mt", undefined, { viewport: { width: 900, height: 620 } });
+  const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
   await reach(page, "complete");
   await setSlider(page, "error", 70);
   const before = await still(page, "drop-before");
@@ -80,7 +80,7 @@ test("a dropped VTU is built and shown, a broken file leaves all as it is", asyn
 });
 
 test("files for the command are told so, and others what is read", async () => {
-  const page = await open("data/bucky-explicit.mt", undefined, { viewport: { width: 900, height: 620 } });
+  const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
   await reach(page, "complete");
   const told = async (name, text) => {
     await drop(page, name, text);
@@ -98,7 +98,7 @@ test("files for the command are told so, and others what is read", async () => {
   assert.equal(await page.evaluate(() => window.tetralodDemo.state), "complete", "the volume stays");
   // The content says what is an MT file.
   await page.evaluate(async () => {
-    const bytes = await (await fetch("data/bucky-explicit.mt")).arrayBuffer();
+    const bytes = await (await fetch("data/bucky-small.mt")).arrayBuffer();
     const dataTransfer = new DataTransfer();
     dataTransfer.items.add(new File([bytes], "volume.bin"));
     window.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));

@@ -134,7 +134,7 @@ test("the page draws every dataset of the demo, of every kind of MT", async () =
     ["sphere-flow", "half-edge", "Flow past a sphere"],
     ["sphere-flow-edge", "edge", "Flow past a sphere (edge-based MT)"],
     ["sphere-flow-vertex", "vertex", "Flow past a sphere (vertex-based MT)"],
-    ["bucky-explicit", "explicit", "Small bucky ball (explicit MT)"],
+    ["bucky-small", "edge", "Small bucky ball (edge-based MT)"],
   ]) {
     const page = await open(`data/${name}.mt`);
     await reach(page, "complete");
@@ -268,7 +268,7 @@ test("each region that the page offers is refined", async () => {
 
 /** The small volume at a coarse mesh, so that pictures come soon, in a view of the page. */
 async function openSmall(view = "Surface") {
-  const page = await open("data/bucky-explicit.mt");
+  const page = await open("data/bucky-small.mt");
   await reach(page, "complete");
   await setSlider(page, "error", 70);
   await show(page, view);
@@ -486,7 +486,7 @@ test("screenshots have any size and background, and leave the canvas as it is", 
   const download = page.waitForEvent("download");
   await page.locator("#tab-export").click();
   await page.locator("#shot").click();
-  assert.match((await download).suggestedFilename(), /^bucky-explicit-\d+x\d+\.png$/);
+  assert.match((await download).suggestedFilename(), /^bucky-small-\d+x\d+\.png$/);
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
@@ -575,7 +575,7 @@ test("the eye flies, and rotations run out unless less motion is asked for", asy
 });
 
 test("a flow has streamlines, arrows and time steps that play", async () => {
-  const page = await open("data/bucky-explicit.mt");
+  const page = await open("data/bucky-small.mt");
   await reach(page, "complete");
   assert.ok(await page.locator("#flow").isDisabled(), "there are no vectors");
   await page.close();

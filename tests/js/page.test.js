@@ -10,7 +10,7 @@ before(() => begin());
 
 after(end);
 
-const SMALL = "data/bucky-explicit.mt";
+const SMALL = "data/bucky-small.mt";
 /** Software draws large pictures slowly. */
 const VIEWPORT = { viewport: { width: 900, height: 620 } };
 /** Where all views are drawn, and nobody looks at details. */
@@ -215,7 +215,7 @@ test("the gallery opens scenes with the counts of the paper, and files are opene
   await page.click("#open-gallery");
   await page.fill("#url", SMALL);
   await page.keyboard.press("Enter");
-  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "explicit", undefined, { timeout: PATIENCE });
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "edge", undefined, { timeout: PATIENCE });
   await page.evaluate(async () => {
     // On a slow machine, the events of the camera come long before the volume is open.
     const { viewer } = window.tetralodDemo;
@@ -310,7 +310,7 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
     return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
   };
   const vtu = await save("[data-export=vtu]");
-  assert.equal(vtu.name, "bucky-explicit.vtu");
+  assert.equal(vtu.name, "bucky-small.vtu");
   assert.ok(vtu.bytes.includes(`NumberOfPoints="${stats.vertices}" NumberOfCells="${stats.tetrahedra}"`));
   assert.ok((await save("[data-export=vtk]")).bytes.includes(`CELL_TYPES ${stats.tetrahedra}\n`));
   const triangles = await page.evaluate(async () => {
@@ -322,7 +322,7 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   assert.ok((await save("[data-export=ply]")).bytes.includes(`element face ${triangles}\n`));
   await page.selectOption("#surface-kind", "boundary");
   const glb = await save("[data-export=glb]");
-  assert.deepEqual([glb.name, glb.bytes.toString("latin1", 0, 4)], ["bucky-explicit-boundary.glb", "glTF"]);
+  assert.deepEqual([glb.name, glb.bytes.toString("latin1", 0, 4)], ["bucky-small-boundary.glb", "glTF"]);
   const { accessors, meshes } = JSON.parse(glb.bytes.toString("utf8", 20, 20 + glb.bytes.readUInt32LE(12)));
   const { COLOR_0: colours, POSITION: places } = meshes[0].primitives[0].attributes;
   assert.equal(accessors[colours].count, accessors[places].count, "each vertex has a colour");
@@ -335,7 +335,7 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   for (const isOverlaid of [true, false]) {
     await page.setChecked("#shot-overlay", isOverlaid);
     const { name, bytes } = await save("#shot");
-    assert.match(name, /^bucky-explicit-\d+x\d+\.png$/);
+    assert.match(name, /^bucky-small-\d+x\d+\.png$/);
     sizes.push(await page.evaluate(async (base64) => {
       const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
       const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
@@ -636,7 +636,7 @@ test("volumes without pictures get some: drawn ones, then those that the page ha
   assert.ok(drawn.length > 3 && drawn.every(([, width]) => width > 0), JSON.stringify(drawn));
   await screenshot(page, "page-drawn-pictures");
   await page.keyboard.press("Escape");
-  await page.waitForFunction(() => Object.keys(localStorage).some((key) => key.startsWith("tetralod-picture data/bucky-explicit.mt")), undefined, { timeout: PATIENCE });
+  await page.waitForFunction(() => Object.keys(localStorage).some((key) => key.startsWith("tetralod-picture data/bucky-small.mt")), undefined, { timeout: PATIENCE });
   const taken = await pictures();
   assert.equal(taken.filter(([start]) => start.startsWith("data:image/web")).length, 1, "of the volume that was shown");
   await screenshot(page, "page-taken-pictures");
@@ -667,13 +667,13 @@ test("another volume gets what fits it of the settings before, is told what does
   await addressed(page, /view=flow/);
   await settle(page);
   await page.locator("#canvas").focus();
-  await openAnother(page, SMALL, "explicit");
+  await openAnother(page, SMALL, "edge");
   await noted(page, /does not have it: .*view Flow/);
   assert.equal(await view(), "iso");
   assert.ok(await page.locator("#message").isHidden(), await page.locator("#message").innerText());
   assert.equal(await demo(page, "error"), null);
   assertDrawn(await picture(page, "another-volume"));
-  assert.deepEqual(await page.evaluate(() => [window.tetralodDemo.viewer.info.kind, "streamlines" in window.tetralodDemo.viewer.state]), ["explicit", false]);
+  assert.deepEqual(await page.evaluate(() => [window.tetralodDemo.viewer.info.kind, "streamlines" in window.tetralodDemo.viewer.state]), ["edge", false]);
   await addressed(page, /^(?!.*flow)/);
 
   await page.click("#undo");
@@ -681,7 +681,7 @@ test("another volume gets what fits it of the settings before, is told what does
   await reach(page, "complete");
   assert.equal(await view(), "flow");
   await page.click("#redo");
-  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "explicit", undefined, { timeout: PATIENCE });
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "edge", undefined, { timeout: PATIENCE });
   await reach(page, "complete");
   assert.equal(await view(), "iso");
   assert.equal(await demo(page, "error"), null);
@@ -722,7 +722,7 @@ test("a surface coloured by a field, with probes, gives way to another volume", 
   await page.locator(".card").waitFor({ timeout: PATIENCE });
   // By keyboard, what is found is told.
   await page.waitForFunction(() => /^Probe A: pressure [−\d.]+.*; velocity/.test(document.getElementById("status").textContent), undefined, { timeout: PATIENCE });
-  await openAnother(page, SMALL, "explicit");
+  await openAnother(page, SMALL, "edge");
   await noted(page, /does not have it: .*colours of velocity/);
   assert.equal(await page.locator(".card").count(), 0);
   assert.ok(await page.locator("#message").isHidden());
@@ -739,7 +739,7 @@ test("the colour bar is there again when the same file is opened again", async (
   await page.locator("#legend").waitFor({ timeout: PATIENCE });
   const words = await page.innerText("#legend");
   await page.evaluate(() => (window.tetralodDemo.stats = undefined));
-  await openAnother(page, SMALL, "explicit");
+  await openAnother(page, SMALL, "edge");
   await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
   await page.locator("#legend").waitFor({ timeout: PATIENCE });
   assert.equal(await page.innerText("#legend"), words);
@@ -793,7 +793,7 @@ test("a link to a file of the user asks for it, and shows it as in the link", as
     dataTransfer.items.add(new File([await (await fetch(url)).arrayBuffer()], "mine.mt"));
     window.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
   }, SMALL);
-  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "explicit", undefined, { timeout: PATIENCE });
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "edge", undefined, { timeout: PATIENCE });
   await reach(page, "complete");
   assert.ok(await page.locator("#message").isHidden());
   assert.deepEqual([await page.locator("[name=mode]:checked").getAttribute("value"), await page.inputValue("#map")], ["slice", "grey"]);

@@ -14,9 +14,9 @@ import { rejects } from "./rejects.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
-/** Hundreds of blocks, of the kinds of MT whose blocks come one by one. */
+/** Hundreds of blocks, of the kind of MT whose blocks come one by one. */
 const blocks = {};
-for (const kind of ["edge", "half-edge"]) blocks[kind] = new Uint8Array(await readFile(`${folder}/blocks-${kind}.mt`));
+for (const kind of ["half-edge"]) blocks[kind] = new Uint8Array(await readFile(`${folder}/blocks-${kind}.mt`));
 /** With two fields. */
 const fields = new Uint8Array(await readFile(`${folder}/fields.mt`));
 /** What the server has. */

@@ -84,10 +84,10 @@ test("the inline entry needs no other file, in a worker and in the caller's thre
   const text = await readFile(at("inline.js"), "utf8");
   const inline = await import(`data:text/javascript;base64,${Buffer.from(text).toString("base64")}`);
   assert.deepEqual(Object.keys(inline).sort(), Object.keys(await import(at("index.js").href)).sort());
-  const other = new Uint8Array(await readFile(`${folder}/small-explicit.mt`));
-  const [explicit] = JSON.parse(await readFile(`${folder}/hashes-explicit.json`, "utf8"));
+  const other = new Uint8Array(await readFile(`${folder}/small-vertex.mt`));
+  const [expectedOfOther] = JSON.parse(await readFile(`${folder}/hashes-vertex.json`, "utf8"));
   for (const worker of [true, false]) {
-    for (const [source, expected] of [[bytes, { options, hash }], [other, explicit]]) {
+    for (const [source, expected] of [[bytes, { options, hash }], [other, expectedOfOther]]) {
       const mt = await inline.MultiTessellation.open(source, { worker });
       await mt.complete;
       await mt.refine(expected.options);

@@ -8,7 +8,7 @@ import { MultiTessellation, TetralodError, applyChanges, emptyMesh } from "../..
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
 const bytes = new Uint8Array(await readFile(`${folder}/small.mt`));
-const KINDS = ["small", "small-edge", "small-vertex", "small-explicit"];
+const KINDS = ["small", "small-edge", "small-vertex"];
 
 const refuses = (promise, name, message = /./) =>
   assert.rejects(promise, (error) => {

@@ -10,7 +10,6 @@ mod histories;
 mod inside;
 mod needs;
 mod orders;
-mod pages;
 mod plain_needs;
 mod random_orders;
 mod rounding;

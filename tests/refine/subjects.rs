@@ -34,16 +34,11 @@ impl Subject {
     /// The smallest set that holds, for each tetrahedron that it makes and that violates the criterion, the update
     /// which removes that tetrahedron, and with each update its parents. By going round until nothing changes.
     pub fn closure(&self, criterion: &impl Criterion) -> Vec<bool> {
-        self.closure_among(criterion, |_| true)
-    }
-
-    /// The same as if there were no other updates than those that are `here`.
-    pub fn closure_among(&self, criterion: &impl Criterion, here: impl Fn(UpdateId) -> bool) -> Vec<bool> {
         let mut set = vec![false; self.explicit.updates() as usize];
         loop {
             let live = self.explicit.extract(&set).expect("a consistent set");
             let violations = live.iter().filter_map(|&t| self.violation(criterion, t));
-            let mut todo: Vec<u32> = violations.filter(|&u| here(u)).map(|u| u.0).collect();
+            let mut todo: Vec<u32> = violations.map(|u| u.0).collect();
             if todo.is_empty() {
                 return set;
             }
@@ -63,11 +58,6 @@ impl Subject {
         let levels = |field: usize| tet.map(|v| self.explicit.levels(v)[field]);
         let look = TetData { corners: &corners, levels: &levels, error, errors, update: u };
         criterion.judge(&look).violates().then_some(u)
-    }
-
-    /// The update that removes a tetrahedron of the explicit MT.
-    pub fn remover(&self, t: u32) -> Option<UpdateId> {
-        self.removers[t as usize]
     }
 
     pub fn fresh(&self) -> Front {

@@ -1,11 +1,12 @@
 //! Promise: who copies only what a session says has changed has the current mesh, whatever was done in between.
 
-use crate::support::meshes::{built, cube, hilly, linear};
+use crate::support::meshes::{cube, hilly, linear};
 use crate::support::requests::requests;
 use std::ops::Range;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mt::{Mt, MtKind};
 use tetralod::session::Session;
+use tetralod_build::{BuildConfig, build};
 
 /// A copy of the mesh, kept up by change lists.
 #[derive(Default)]
@@ -54,10 +55,11 @@ fn opened(mt: &Mt) -> Session {
 
 #[test]
 fn copies_follow_a_walk_of_requests_and_steps() {
-    let edge = Mt::from(built(&cube(6, &[hilly, linear])).mt);
-    let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
-    for mt in [edge, spelled] {
-        let mut session = opened(&mt);
+    let mesh = cube(6, &[hilly, linear]);
+    for kind in MtKind::OF_FILES {
+        let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
+        let built = build(&mesh, &config);
+        let mut session = opened(&built.expect("a valid mesh").mt);
         let mut copy = Copy::default();
         for i in 0_usize..60 {
             let request = &requests()[i * i % 7];

@@ -1,4 +1,5 @@
-//! Promise: a session does the same with an MT of any kind that holds the same updates, also while it arrives.
+//! Promise: a session has the meshes of the updates in its file, also while it arrives: those that the explicit structure with the
+//! same updates has. (Half-edge MTs, which may come in any order, are compared with it in `tests/mt/half_edge_pages.rs`.)
 
 use crate::support::files::sections;
 use crate::support::meshes::{bent, built, cube, hilly, linear};
@@ -7,16 +8,18 @@ use crate::support::strategies::config;
 use proptest::prelude::*;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{Mt, MtKind, MultiTessellation};
-use tetralod::refine::Request;
+use tetralod::mt::{
+    ExplicitMt, ExplicitUpdate, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages, VertexId,
+};
+use tetralod::refine::{Front, LodCriterion, Request};
 use tetralod::session::Session;
 use tetralod_build::verify::{self, Reference};
+use tetralod_build::{BuildConfig, build};
 
-/// The MT as it was built, and spelled out.
-fn both(mesh: &TetMesh) -> [Mt; 2] {
-    let edge = Mt::from(built(mesh).mt);
-    let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
-    [edge, spelled]
+/// An MT of a kind with all fields of the mesh.
+fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
+    let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
+    build(mesh, &config).expect("a valid mesh").mt
 }
 
 fn bytes_of(mt: &Mt) -> Vec<u8> {
@@ -37,52 +40,66 @@ fn ends(bytes: &[u8]) -> Vec<usize> {
     ends.into_iter().chain([bytes.len()]).collect()
 }
 
-/// Feeds both files section by section, each in pieces, and makes requests in between.
-fn streamed(files: &[Vec<u8>; 2], piece: usize, order: &[prop::sample::Index]) {
-    let mut order = order.iter().cycle();
-    let mut sessions = [Session::new(), Session::new()];
-    let [of_edge, of_spelled] = files.each_ref().map(|bytes| ends(bytes));
-    assert_eq!(of_edge.len(), of_spelled.len(), "as many blocks");
-    let mut starts = [0, 0];
-    for ends in of_edge.into_iter().zip(of_spelled).map(<[usize; 2]>::from) {
-        for (i, end) in ends.into_iter().enumerate() {
-            for piece in files[i][starts[i]..end].chunks(piece) {
-                sessions[i].feed(piece).expect("a good file");
-            }
-            starts[i] = end;
+/// Adds the next update of the whole MT to a part of it.
+fn grow(part: &mut ExplicitMt, whole: &ExplicitMt) {
+    let u = UpdateId(part.updates());
+    let created = whole.created(u).map(VertexId);
+    let positions: Vec<[i32; 3]> = created.clone().map(|v| whole.position(v)).collect();
+    let levels: Vec<i32> = created.flat_map(|v| whole.levels(v).to_vec()).collect();
+    let inserted = whole.inserted(u);
+    let update = ExplicitUpdate {
+        positions: &positions,
+        levels: &levels,
+        removed: whole.removed(u),
+        inserted: &whole.tets()[inserted.start as usize..inserted.end as usize],
+        errors: whole.errors(u),
+    };
+    assert_eq!(part.push(&update), Ok(u));
+}
+
+/// Feeds a file section by section, each in pieces, and makes requests in between.
+fn streamed(mt: &Mt, piece: usize, order: &[prop::sample::Index]) {
+    let bytes = bytes_of(mt);
+    let whole = ExplicitMt::of(mt).expect("any MT can be spelled out");
+    let mut part = ExplicitMt::new(whole.info().clone(), whole.base().clone());
+    let mut front = Front::new(&part).expect("a valid base mesh");
+    let (mut session, mut order, mut start) = (Session::new(), order.iter().cycle(), 0);
+    for end in ends(&bytes) {
+        for piece in bytes[start..end].chunks(piece) {
+            session.feed(piece).expect("a good file");
         }
-        if sessions[0].info().is_none() {
-            continue;
-        }
+        start = end;
+        let Some(here) = session.mt().map(UpdatePages::present) else { continue };
+        (part.updates()..here).for_each(|_| grow(&mut part, &whole));
         for _ in 0..3 {
             let request = &requests()[order.next().expect("it cycles").index(7)];
-            let [mut edge, spelled] = sessions.each_mut().map(|s| s.refine(request).expect("a good request"));
-            // How much had to be looked at is each structure's own affair.
-            edge.judged = spelled.judged;
-            assert_eq!(edge, spelled, "{request:?}");
-            let [edge, spelled] = sessions.each_mut().map(|s| (s.hash(), s.view().tets.len()));
-            assert_eq!(edge, spelled, "{request:?}");
-            sessions.iter().for_each(|s| s.mesh().expect("it is open").check().expect("a valid mesh"));
+            let stats = session.refine(request).expect("a good request");
+            let criterion = LodCriterion::new(part.info(), request);
+            front.satisfy(&part, &criterion, request.budget).expect("a valid MT");
+            assert_eq!(session.hash(), front.mesh().hash(), "{request:?}");
+            assert_eq!(stats.tetrahedra as usize, front.mesh().tet_count(), "{request:?}");
+            assert_eq!(session.view().tets.len(), front.mesh().tet_count(), "{request:?}");
+            session.mesh().expect("it is open").check().expect("a valid mesh");
         }
     }
-    assert!(sessions.iter_mut().all(|s| s.finish().is_ok()));
-    let surfaces = sessions.each_mut().map(|s| {
-        s.refine(&Request::within(0.0)).expect("a good request");
-        s.isosurface(0.3).expect("it is open").indices.len()
-    });
-    assert_eq!(surfaces[0], surfaces[1]);
+    session.finish().expect("a whole file");
+    assert_eq!(part.updates(), whole.updates());
+    session.refine(&Request::within(0.0)).expect("a good request");
+    assert!(!session.isosurface(0.3).expect("it is open").indices.is_empty());
 }
 
 proptest! {
     #![proptest_config(config(6, 53))]
 
     #[test]
-    fn meshes_are_the_same_at_every_moment(
+    fn meshes_are_those_of_the_explicit_structure_at_every_moment(
         piece in 1..5000_usize,
         order in prop::collection::vec(any::<prop::sample::Index>(), 20),
     ) {
         for mesh in [cube(11, &[hilly, linear]), bent(11)] {
-            streamed(&both(&mesh).each_ref().map(bytes_of), piece, &order);
+            for kind in [MtKind::Edge, MtKind::Vertex] {
+                streamed(&made(&mesh, kind), piece, &order);
+            }
         }
     }
 }
@@ -90,16 +107,22 @@ proptest! {
 #[test]
 fn converted_to_and_fro_the_file_is_the_same() {
     for mesh in [cube(8, &[hilly, linear]), bent(9)] {
-        let [edge, spelled] = both(&mesh);
-        let back = spelled.convert(MtKind::Edge).expect("it was one");
-        assert_eq!(bytes_of(&back), bytes_of(&edge));
+        for (kind, other) in [
+            (MtKind::Edge, MtKind::Explicit),
+            (MtKind::Vertex, MtKind::HalfEdge),
+            (MtKind::HalfEdge, MtKind::Vertex),
+        ] {
+            let mt = made(&mesh, kind);
+            let back = mt.convert(other).and_then(|mt| mt.convert(kind)).expect("the same updates");
+            assert_eq!(bytes_of(&back), bytes_of(&mt), "{}", kind.name());
+        }
     }
 }
 
 #[test]
 fn an_explicit_mt_keeps_every_promise() {
     let mesh = bent(6);
-    let [_, spelled] = both(&mesh);
+    let spelled = Mt::from(built(&mesh).mt).convert(MtKind::Explicit).expect("any MT can be spelled out");
     let report = verify::run(&spelled, &mesh, Reference::Mesh, &mut |_, _| {});
     assert!(report.valid && report.queries > 40, "{:#?}", report.failures);
     // The reference mesh has the points of the input, too.

@@ -4,7 +4,7 @@
 use crate::support::random::Random;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode};
 use tetralod::geom::Bounds;
-use tetralod::mt::{CurrentMesh, MtKind};
+use tetralod::mt::CurrentMesh;
 use tetralod::refine::{Need, Request};
 use tetralod::session::{BlockState, MappedBlock, Session};
 use tetralod_build::{BuildConfig, build};
@@ -12,16 +12,10 @@ use tetralod_io::generate;
 
 const BLOCK_BITS: u32 = 6;
 
-/// The kinds whose blocks come one by one.
-const KINDS: [MtKind; 2] = [MtKind::Edge, MtKind::HalfEdge];
-
-fn file(kind: MtKind) -> Vec<u8> {
-    file_of(kind, 15)
-}
-
-fn file_of(kind: MtKind, size: u32) -> Vec<u8> {
+/// A half-edge file: the kind whose blocks come one by one.
+fn file(size: u32) -> Vec<u8> {
     let mesh = generate::bucky(size).expect("a size that is allowed");
-    let config = BuildConfig { block_bits: BLOCK_BITS, ..BuildConfig::of(kind) };
+    let config = BuildConfig { block_bits: BLOCK_BITS, ..BuildConfig::default() };
     let mt = build(&mesh, &config).expect("a valid mesh").mt;
     encode(&mt, &EncodeOptions::default()).expect("a sound MT")
 }
@@ -86,11 +80,7 @@ fn requests(random: &mut Random) -> Request {
 
 #[test]
 fn the_mesh_is_that_of_the_whole_file() {
-    KINDS.into_iter().for_each(has_the_mesh_of_the_whole_file);
-}
-
-fn has_the_mesh_of_the_whole_file(kind: MtKind) {
-    let file = file(kind);
+    let file = file(15);
     let random = &mut Random::new(7);
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
@@ -112,11 +102,7 @@ fn has_the_mesh_of_the_whole_file(kind: MtKind) {
 
 #[test]
 fn memory_stays_within_the_room() {
-    KINDS.into_iter().for_each(stays_within_the_room);
-}
-
-fn stays_within_the_room(kind: MtKind) {
-    let file = file(kind);
+    let file = file(15);
     let random = &mut Random::new(8);
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
@@ -135,7 +121,7 @@ fn stays_within_the_room(kind: MtKind) {
         if progress.left_out == 0 {
             whole.refine(&request).expect("a sensible request");
             assert_eq!(session.hash(), whole.hash(), "what fits is as good as the whole file");
-            assert!(satisfied, "{kind:?}, {request:?}");
+            assert!(satisfied, "{request:?}");
             complete += 1;
         } else {
             left_out += 1;
@@ -146,12 +132,8 @@ fn stays_within_the_room(kind: MtKind) {
 
 #[test]
 fn the_map_of_blocks_tells_where_they_are_and_which_are_used() {
-    KINDS.into_iter().for_each(has_a_map);
-}
-
-fn has_a_map(kind: MtKind) {
     // Larger than what is fetched at first.
-    let file = file_of(kind, 26);
+    let file = file(26);
     let mut server = Server { file: &file, given: 0 };
     let mut session = Session::in_parts(DecodeOptions::default(), u64::MAX);
     assert!(session.block_map().is_empty(), "nothing is known before the index is here");
@@ -169,7 +151,7 @@ fn has_a_map(kind: MtKind) {
     let count = |state| map.iter().filter(|block| block.state == state).count();
     assert_eq!(map.len(), progress.blocks as usize);
     assert_eq!(count(BlockState::Missing), (progress.blocks - progress.here) as usize);
-    assert!(count(BlockState::Missing) > 0, "{kind:?}: not all is fetched");
+    assert!(count(BlockState::Missing) > 0, "not all is fetched");
     assert!(count(BlockState::InUse) > 0);
     let whole = session.info().expect("it is open").lattice;
     let largest = whole.point([1 << whole.bits; 3]);

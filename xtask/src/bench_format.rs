@@ -1,6 +1,5 @@
 //! `cargo xtask bench --format`: what MT files cost and what requests need of them; writes `docs/benchmarks.md`.
 
-use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,9 +12,6 @@ use crate::shell;
 const SIZES: [u32; 2] = [33, 65];
 const LARGER: [u32; 2] = [97, 129];
 const WALKED: u32 = 97;
-
-/// Kinds that come in blocks.
-const KINDS: [&str; 2] = ["edge", "half-edge"];
 
 const HEAD: &str = "\
 # Benchmarks
@@ -30,9 +26,8 @@ Bytes per vertex of the reference mesh, with one field. *bits* are those of the 
 cells need them; fields have 16. *raw* are positions and field as 32-bit floats and tetrahedra as four 32-bit numbers; *xz*
 is what `xz -9` makes of these arrays, *shuffled* of their columns as differences, byte by byte, without loss: on grids in
 their natural order these differences are nearly all the same. *as given* is the file of the data set, which may hold
-more than this one field. All MT files hold the whole Multi-Tessellation, not the reference mesh alone. *index* is the share of
-header, description and index in the edge-based file; *decode* are million updates a second on one thread, the fastest of five
-runs. Only sets of up to 100 000 points were built as vertex-based MTs, by half-edge collapses.
+more than this one field. All MT files hold the whole Multi-Tessellation, not the reference mesh alone. *decode* are
+million updates of the edge-based file a second on one thread, the fastest of five runs. Only sets of up to 100 000 points were built as vertex-based MTs, by half-edge collapses.
 ";
 
 const PICTURE: &str = "
@@ -75,15 +70,12 @@ pub fn run() -> Result<()> {
     let requests = bench("requests", &inputs.into_iter().chain(larger).collect::<Vec<_>>())?;
     let requests = requests.replace("## Boxes\n\n", &format!("## Boxes\n\n{BOXES}"));
     fs::create_dir_all("target/bench")?;
-    let mut walks = String::new();
-    for kind in KINDS {
-        let file = Path::new("target/bench").join(format!("bucky{WALKED}-{kind}.mt"));
-        bench("make", &[WALKED.to_string(), kind.to_owned(), absolute(&file)?])?;
-        // A process of its own, for its memory is measured.
-        let walk = bench("walk", &[absolute(&file)?])?;
-        write!(walks, "The generated volume of {WALKED}³ points, kind {kind}.\n\n{walk}\n")?;
-    }
-    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &walks].concat();
+    let file = Path::new("target/bench").join(format!("bucky{WALKED}-half-edge.mt"));
+    bench("make", &[WALKED.to_string(), "half-edge".to_owned(), absolute(&file)?])?;
+    // A process of its own, for its memory is measured.
+    let walk = bench("walk", &[absolute(&file)?])?;
+    let walk = format!("The generated volume of {WALKED}³ points, kind half-edge.\n\n{walk}\n");
+    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &walk].concat();
     benchmarks_page::write(Part::Files, &page)
 }
 

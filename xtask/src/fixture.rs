@@ -26,8 +26,7 @@ fn requests() -> Vec<Value> {
 }
 
 /// The files beside `small.mt`, of the other kinds, and how they are built.
-const OTHERS: [(&str, &[&str]); 3] =
-    [("edge", &["--kind", "edge"]), ("vertex", &["--kind", "vertex"]), ("explicit", &["--kind", "explicit"])];
+const OTHERS: [(&str, &[&str]); 2] = [("edge", &["--kind", "edge"]), ("vertex", &["--kind", "vertex"])];
 
 /// Makes `small.mt` and `hashes.json`, a list of `{ options, hash }`; and the same for the other kinds of MT, with the
 /// kind in the names.
@@ -45,16 +44,14 @@ pub fn make(tetralod: &Path) -> Result<()> {
     fixture_builds::make(tetralod, folder)
 }
 
-/// Makes `blocks-edge.mt` and `blocks-half-edge.mt`, files of hundreds of blocks, and `fields.mt`, one of two fields.
+/// Makes `blocks-half-edge.mt`, a file of hundreds of blocks, and `fields.mt`, one of two fields.
 fn make_blocks(tetralod: &Path, folder: &Path) -> Result<()> {
-    for (name, kind, data, size, extension) in [
-        ("blocks-edge", "edge", "bucky", "33", "vti"),
-        ("blocks-half-edge", "half-edge", "bucky", "33", "vti"),
-        ("fields", "edge", "sphere-flow", "14", "vtu"),
-    ] {
+    for (name, data, size, extension) in
+        [("blocks-half-edge", "bucky", "33", "vti"), ("fields", "sphere-flow", "14", "vtu")]
+    {
         let [mesh, mt] = [extension, "mt"].map(|extension| folder.join(format!("{name}.{extension}")));
         shell::run(shell::command(tetralod, ["generate", data, "--size", size, "-o"]).arg(&mesh))?;
-        let build = ["build", "--quiet", "--kind", kind, "--all-fields", "--block-updates", "64", "-o"];
+        let build = ["build", "--quiet", "--all-fields", "--block-updates", "64", "-o"];
         shell::run(shell::command(tetralod, build).arg(mt).arg(mesh))?;
     }
     Ok(())

@@ -23,7 +23,6 @@ fn builds() -> Vec<(&'static [&'static str], &'static [&'static str], Value)> {
             json!({ "kind": "edge", "displacement": "10%" }),
         ),
         (&["small.vti"], &["--kind", "vertex"], json!({ "kind": "vertex" })),
-        (&["small.vti"], &["--kind", "explicit"], json!({ "kind": "explicit" })),
         (&["small.vti"], &["--for", "regions"], json!({ "purpose": "regions" })),
         (
             &["fields.vtu"],

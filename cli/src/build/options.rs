@@ -31,11 +31,11 @@ pub struct BuildOptions {
     /// Build one of the time steps alone; the first one is 0.
     #[arg(long, value_name = "N")]
     pub(super) step: Option<usize>,
-    /// The kind of MT: half-edge (the best for regions), edge, vertex or explicit [default: what goes with the other options, else half-edge].
+    /// The kind of MT: half-edge (the best for regions), edge or vertex [default: what goes with the other options, else half-edge].
     #[arg(long, value_name = "KIND", value_parser = kind)]
     kind: Option<MtKind>,
-    /// How it is built: collapse (edges, for kind edge), insert or decimate (vertices, for kind vertex); any for kind
-    /// explicit [default: collapse, decimate for kinds vertex and half-edge].
+    /// How it is built: collapse (edges, for kind edge), insert or decimate (vertices, for kind vertex)
+    /// [default: collapse, decimate for kinds vertex and half-edge].
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
     /// By what criterion vertices go or come: delaunay, or half-edge with decimate alone [default: half-edge with
@@ -101,7 +101,7 @@ pub struct BuildOptions {
 
 /// Parses the name of a kind of MT.
 pub fn kind(text: &str) -> Result<MtKind> {
-    named(text, &MtKind::ALL.map(|kind| (kind.name(), kind)))
+    named(text, &MtKind::OF_FILES.map(|kind| (kind.name(), kind)))
 }
 
 /// How finely the values of a field are kept, or of all without a name.

@@ -361,8 +361,8 @@ fn the_same_input_gives_the_same_bytes() {
 #[test]
 fn kinds_are_built_and_converted() {
     let folder = Folder::new("kinds");
-    let [input, edge, spelled, other, out] =
-        ["b.vti", "e.mt", "x.mt", "o.mt", "o.vtu"].map(|name| folder.path(name));
+    let [input, edge, half_edge, vertex, other, out] =
+        ["b.vti", "e.mt", "h.mt", "v.mt", "o.mt", "o.vtu"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "9", "-o", &input]);
     // What is not named goes with what is.
     for (options, kind, method, criterion) in [
@@ -383,34 +383,33 @@ fn kinds_are_built_and_converted() {
     let bytes = |path: &str| fs::read(path).expect("it is there");
     assert!(bytes(&edge) == bytes(&other));
 
-    let built = json(&["build", &input, "--kind", "explicit", "-o", &spelled, "--json"]);
-    assert_eq!((&built["kind"], &built["method"]), (&"explicit".into(), &"collapse".into()));
-    let report = json(&["convert", &edge, "--kind", "explicit", "-o", &other, "--json"]);
-    assert_eq!((&report["kind"], &report["from"]), (&"explicit".into(), &"edge".into()));
-    assert!(bytes(&spelled) == bytes(&other), "built as explicit, or converted");
-    let info = json(&["info", &spelled, "--json"]);
-    assert_eq!((&info["kind"], &info["metadata"]["method"]), (&"explicit".into(), &"collapse".into()));
+    // Both are made of insertions.
+    good(&["build", &input, "-o", &half_edge, "--quiet"]);
+    let report = json(&["convert", &half_edge, "--kind", "vertex", "-o", &vertex, "--json"]);
+    assert_eq!((&report["kind"], &report["from"]), (&"vertex".into(), &"half-edge".into()));
+    let info = json(&["info", &vertex, "--json"]);
+    assert_eq!((&info["kind"], &info["metadata"]["method"]), (&"vertex".into(), &"decimate".into()));
     assert_eq!(info["memory"]["compact_bytes"], report["memory_bytes"]);
     for key in ["vertices", "tetrahedra", "updates", "file_bytes", "bytes_per_vertex"] {
         assert_eq!(info[key], report[key], "{key}");
     }
-    let of_edge = json(&["info", &edge, "--json"]);
+    let before = json(&["info", &half_edge, "--json"]);
     for key in ["bounds", "depth", "arcs_per_node", "tets_per_update", "base_tetrahedra", "metadata"] {
-        assert_eq!(info[key], of_edge[key], "{key}");
+        assert_eq!(info[key], before[key], "{key}");
     }
     for key in ["name", "min", "max", "bits", "quantization", "floor", "histogram"] {
-        assert_eq!(info["fields"][0][key], of_edge["fields"][0][key], "{key}");
+        assert_eq!(info["fields"][0][key], before["fields"][0][key], "{key}");
     }
-    assert!(
-        good(&["info", &edge]).contains("edge collapse") && good(&["info", &spelled]).contains("explicit")
-    );
+    assert!(good(&["info", &edge]).contains("edge collapse"));
+    assert!(good(&["info", &vertex]).contains("vertex insertion"));
     let hash = |mt: &str| json(&["extract", mt, "--error", "2%", "-o", &out, "--json"])["hash"].clone();
-    assert_eq!(hash(&edge), hash(&spelled));
-    assert!(good(&["verify", &spelled, "--against", &input]).contains("every promise is kept"));
-    json(&["bench", &spelled, "--json"]);
+    assert_eq!(hash(&half_edge), hash(&vertex));
+    assert!(good(&["verify", &vertex, "--against", &input]).contains("every promise is kept"));
+    json(&["bench", &vertex, "--json"]);
 
-    assert!(good(&["convert", &spelled, "--kind", "edge", "-o", &other]).contains("edge, was explicit"));
-    assert!(bytes(&edge) == bytes(&other), "there and back");
+    let back = good(&["convert", &vertex, "--kind", "half-edge", "-o", &other]);
+    assert!(back.contains("half-edge, was vertex"), "{back}");
+    assert!(bytes(&half_edge) == bytes(&other), "there and back");
     good(&["convert", &edge, "--kind", "edge", "-o", &other, "--quiet"]);
     assert!(bytes(&edge) == bytes(&other), "nothing to do");
     let before = folder.names();
@@ -519,14 +518,15 @@ fn kinds_methods_and_criteria_that_do_not_go_together_are_refused() {
     for (options, words) in [
         (
             &["--kind", "edge", "--method", "insert"][..],
-            &["kind edge", "method insert", "collapse", "kinds vertex and explicit"][..],
+            &["kind edge", "method insert", "collapse", "kind vertex"][..],
         ),
         (&["--kind", "edge", "--method", "decimate"], &["kind edge", "method decimate", "collapse"]),
         (&["--kind", "vertex", "--method", "collapse"], &["kind vertex", "insert and decimate"]),
         (&["--kind", "vertex", "--method", "insert", "--criterion", "half-edge"], &["delaunay", "decimate"]),
         (&["--method", "collapse", "--criterion", "delaunay"], &["--method insert or decimate"]),
-        (&["--kind", "explicit", "--criterion", "half-edge"], &["--method insert or decimate"]),
-        (&["--kind", "face"], &["face", "edge, vertex, explicit"]),
+        (&["--kind", "edge", "--criterion", "half-edge"], &["--method insert or decimate"]),
+        (&["--kind", "vertex"], &["explicit", "half-edge, edge, vertex"]),
+        (&["--kind", "face"], &["face", "half-edge, edge, vertex"]),
         (&["--method", "guess"], &["guess", "collapse, insert, decimate"]),
         (&["--criterion", "none"], &["none", "delaunay, half-edge"]),
         (&["--kind", "vertex", "--for", "all"], &["all", "uniform, regions"]),
@@ -673,11 +673,11 @@ fn inputs_are_never_replaced() {
     fs::write(&medit, format!("{head}{vertices}Tetrahedra 1\n1 2 3 4 0\nEnd\n")).expect("a file");
     fs::write(&solution, format!("{head}SolAtVertices 4\n1 1\n0 1 2 3\nEnd\n")).expect("a file");
     for arguments in [
-        &["convert", &mt, "-o", &mt, "--kind", "explicit"][..],
-        &["convert", &mt, "-o", &roundabout, "--kind", "explicit"],
-        &["convert", &roundabout, "-o", &mt, "--kind", "explicit"],
+        &["convert", &mt, "-o", &mt, "--kind", "vertex"][..],
+        &["convert", &mt, "-o", &roundabout, "--kind", "vertex"],
+        &["convert", &roundabout, "-o", &mt, "--kind", "vertex"],
         #[cfg(unix)]
-        &["convert", &mt, "-o", &linked, "--kind", "explicit"],
+        &["convert", &mt, "-o", &linked, "--kind", "vertex"],
         &["extract", &mt, "-o", &mesh, "--measure", &mesh],
         &["extract", &renamed, "-o", &renamed],
         &["extract", &mt, "-o", &mesh, "--measure", &list],
@@ -754,7 +754,7 @@ fn outputs_have_names_and_places() {
         (&["build", &input, "-o", &other], &["is a folder"]),
         (&["build", &input, "-o", &input], &[".mt", "in.vti"]),
         (&["build", &input, "-o", &vtu], &["extract", ".mt"]),
-        (&["convert", &mt, "-o", &stl, "--kind", "explicit"], &["surface", ".mt"]),
+        (&["convert", &mt, "-o", &stl, "--kind", "vertex"], &["surface", ".mt"]),
         (&["extract", &mt, "-o", &stl], &["surface", ".vtu"]),
         (&["extract", &mt, "-o", "-"], &["/dev/stdout"]),
         (&["surface", &mt, "-o", &folder.path("none/a.stl")], &["no folder"]),

@@ -65,10 +65,10 @@ fn several_fields_with_units_times_and_metadata() {
     bad(1, &[&built[..], &["--unit", "q=m"]].concat(), &["'q'"]);
     bad(2, &[&built[..], &["--meta", "method=x"]].concat(), &["method"]);
     // A conversion keeps it all.
-    let [again, explicit] = ["c.mt", "d.mt"].map(|name| folder.path(name));
+    let [again, vertex] = ["c.mt", "d.mt"].map(|name| folder.path(name));
     good(&["build", &input, "-o", &again, "--quiet", "--field", "U", "--meta", "case=1"]);
-    good(&["convert", &again, "-o", &explicit, "--kind", "explicit", "--quiet"]);
-    let [a, b] = [&again, &explicit].map(|path| {
+    good(&["convert", &again, "-o", &vertex, "--kind", "vertex", "--quiet"]);
+    let [a, b] = [&again, &vertex].map(|path| {
         let mut info = json(&["info", path, "--json"]);
         let fields = info["fields"].as_array_mut().expect("a list");
         // How many bytes a mesh takes depends on the kind.

@@ -50,8 +50,8 @@ pub struct BuildConfig {
     pub preserve_within: f64,
     /// Places of points of the mesh that stay in all meshes, in model units. Not by [`Method::Insert`](crate::Method::Insert).
     pub keep_points: Vec<[f64; 3]>,
-    /// log2 of the updates that pages of the MT, and so the blocks of its file, are going to have, 4 to 16: within a page of an
-    /// edge-based MT updates are numbered so that they take few bits.
+    /// log2 of the updates that the blocks of the MT's file, and so pages of a half-edge MT, are going to have, 4 to 16: within a block of
+    /// an edge-based MT updates are numbered so that they take few bits.
     pub block_bits: u32,
 }
 

@@ -319,11 +319,11 @@ fn contradiction(kind: MtKind, method: Method, criterion: BuildCriterion) -> Bui
     let (which, instead) = match (kind, method) {
         (MtKind::Edge, _) => (
             [of_kind, method.described()],
-            "MTs of kind edge are built by method collapse; methods insert and decimate build kinds vertex and explicit",
+            "MTs of kind edge are built by method collapse; methods insert and decimate build kind vertex",
         ),
         (MtKind::Vertex, Method::Collapse) => (
             [of_kind, method.described()],
-            "MTs of kind vertex are built by methods insert and decimate; method collapse builds kinds edge and explicit",
+            "MTs of kind vertex are built by methods insert and decimate; method collapse builds kind edge",
         ),
         (MtKind::HalfEdge, Method::Collapse | Method::Insert) => (
             [of_kind, method.described()],
@@ -331,7 +331,7 @@ fn contradiction(kind: MtKind, method: Method, criterion: BuildCriterion) -> Bui
         ),
         (MtKind::HalfEdge, Method::Decimate) => (
             [of_kind, by_criterion],
-            "MTs of kind half-edge are built with criterion half-edge; criterion delaunay builds kinds vertex and explicit",
+            "MTs of kind half-edge are built with criterion half-edge; criterion delaunay builds kind vertex",
         ),
         (MtKind::Vertex | MtKind::Explicit, _) => (
             [method.described(), by_criterion],

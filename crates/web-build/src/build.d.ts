@@ -29,7 +29,7 @@ export interface InputInfo {
 /** How an MT is built: the options of the command `tetralod build`, under the same names. */
 export interface CoreBuildOptions {
   /** The kind of MT. Default: what goes with the other options, else `"half-edge"`. */
-  kind?: "half-edge" | "edge" | "vertex" | "explicit";
+  kind?: "half-edge" | "edge" | "vertex";
   /** How it is built. Default: `"collapse"` for kind edge, `"decimate"` for kinds half-edge and vertex. */
   method?: "collapse" | "insert" | "decimate";
   /** By what criterion vertices go or come. Default: `"half-edge"` with method decimate. */
@@ -116,7 +116,7 @@ export interface RepairReport {
 
 /** What was built. */
 export interface CoreBuildReport {
-  kind: "half-edge" | "edge" | "vertex" | "explicit";
+  kind: "half-edge" | "edge" | "vertex";
   method: "collapse" | "insert" | "decimate";
   criterion: "delaunay" | "half-edge" | undefined;
   /** Of the reference mesh. */

@@ -53,7 +53,7 @@ pub fn build_options(options: &JsValue) -> Result<BuildOptions, WebError> {
     check_names(options)?;
     let from = Options(options);
     let choice = ConstructionChoice {
-        kind: from.name("kind", &MtKind::ALL.map(|kind| (kind.name(), kind)))?,
+        kind: from.name("kind", &MtKind::OF_FILES.map(|kind| (kind.name(), kind)))?,
         method: from.name("method", &Method::ALL.map(|method| (method.name(), method)))?,
         criterion: from.name("criterion", &BuildCriterion::ALL.map(|by| (by.name(), by)))?,
         purpose: from.name("purpose", &Purpose::ALL.map(|purpose| (purpose.name(), purpose)))?,

@@ -15,7 +15,7 @@ const MT: &[u8] = include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small.mt"))
 const HASHES: &str = include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes.json"));
 
 /// MTs of the other kinds, each with its hashes.
-const OTHERS: [(&[u8], &str); 3] = [
+const OTHERS: [(&[u8], &str); 2] = [
     (
         include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-edge.mt")),
         include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-edge.json")),
@@ -23,10 +23,6 @@ const OTHERS: [(&[u8], &str); 3] = [
     (
         include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-vertex.mt")),
         include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-vertex.json")),
-    ),
-    (
-        include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-explicit.mt")),
-        include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-explicit.json")),
     ),
 ];
 

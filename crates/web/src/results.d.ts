@@ -49,15 +49,13 @@ export interface FieldInfo {
 }
 
 /**
- * How many bytes have to be fetched for a mesh that is nowhere further from the reference mesh than some error: known from the
- * file's index, before any block has arrived. For an error in between, the next entry holds.
+ * How many bytes have to be fetched for a mesh that is nowhere further from the reference mesh than some error: known
+ * before any block has arrived. For an error in between, the next entry holds.
  *
- * - *Half-edge and edge:* exactly the bytes of the blocks that are fetched for `refine({ error })` or `refine({ relativeError })` of this
+ * - *Half-edge:* exactly the bytes of the blocks that are fetched for `refine({ error })` or `refine({ relativeError })` of this
  *   field after `open`, with what stands in front of them. It is less where blocks are here or in the cache already, and a little
  *   more where requests reach over gaps (see `gap`).
- * - *Vertex and explicit:* these come from front to back, and this many bytes are enough. It may be less, by two blocks and by what the
- *   index rounds errors up, at most an eighth. The rest
- *   of the file comes all the same.
+ * - *Edge and vertex:* these come from front to back and do not say before what is where: one entry, the whole file.
  *
  * @example
  * const { errors, bytes } = mt.info.fields[0].curve;
@@ -89,7 +87,7 @@ export interface BlockProgress {
 /** What is known of a volume as soon as it is open. */
 export interface MtInfo {
   /** The kind of Multi-Tessellation: what its updates are. */
-  kind: "half-edge" | "edge" | "vertex" | "explicit";
+  kind: "half-edge" | "edge" | "vertex";
   fields: FieldInfo[];
   /**
    * The box around the reference mesh, which holds every mesh of the volume: `[x0, y0, z0, x1, y1, z1]` in model units. Of files that were

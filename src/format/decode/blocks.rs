@@ -3,7 +3,7 @@
 use super::{Decoder, ExactStatus, Stage};
 use crate::format::header::{END_BYTES, HEAD_BYTES, Kind, SectionHead};
 use crate::format::read::Reader;
-use crate::format::{BlockInfo, FormatError, payload};
+use crate::format::{BlockInfo, FormatError};
 use crate::mt::{PageError, UpdatePages};
 use std::ops::Range;
 
@@ -26,8 +26,8 @@ fn section(bytes: &[u8], offset: u64, short: impl Fn() -> FormatError) -> Result
 }
 
 impl Decoder {
-    /// The bytes of the file that hold a block with the wanted fields, in ranges that do not touch; empty if there is no such
-    /// block.
+    /// The bytes of the file that hold a block of a half-edge MT with the wanted fields, in ranges that do not touch; empty if there is
+    /// no such block.
     pub fn block_ranges(&self, block: u32) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         let Some(index) = &self.head.index else { return ranges };
@@ -53,7 +53,7 @@ impl Decoder {
         self.head.index_end.checked_add(index.shared)
     }
 
-    /// The bytes of the file behind the blocks, where exact values are; none if there are none, or that is not known yet.
+    /// The bytes of the file behind the blocks of a half-edge MT, where exact values are; none if there are none, or that is not known yet.
     pub fn exact_range(&self) -> Option<Range<u64>> {
         let index = self.head.index.as_ref()?;
         let blocks = index.blocks.iter().try_fold(0_u64, |sum, block| sum.checked_add(block.len()))?;
@@ -62,13 +62,14 @@ impl Decoder {
         (start < end).then_some(start..end)
     }
 
-    /// Whether the file keeps exact values, and whether they are here. Files whose header does not state their length keep none until
-    /// these have arrived.
+    /// Whether the file keeps exact values, and whether they are here. Files of half-edge MTs whose header does not state their length keep
+    /// none until these have arrived.
     pub fn exact_status(&self) -> ExactStatus {
         // In files that come from front to back the end shows whether there were more.
         let all_here = self.has_all_exact || matches!(self.stage, Stage::End);
-        match self.exact_range() {
-            Some(_) if !all_here => ExactStatus::Missing,
+        let has_some = self.head.start.exact || self.exact_range().is_some();
+        match has_some {
+            true if !all_here => ExactStatus::Missing,
             _ if !self.exact.is_empty() => ExactStatus::Here,
             _ => ExactStatus::None,
         }
@@ -126,8 +127,8 @@ impl Decoder {
         self.block_ranges(block).iter().any(|range| range.start == start).then_some(block)
     }
 
-    /// Takes in a whole block of a half-edge or edge-based MT: the bytes of [`Decoder::block_ranges`], one after the other. In
-    /// edge-based MTs the blocks on which it depends must be there. Afterwards no more bytes can be fed in the order of the file.
+    /// Takes in a whole block of a half-edge MT: the bytes of [`Decoder::block_ranges`], one after the other. The blocks on which it
+    /// depends need not be there. Afterwards no more bytes can be fed in the order of the file.
     ///
     /// # Errors
     /// When the bytes are damaged, or the block cannot be taken now; nothing has changed then.
@@ -139,7 +140,7 @@ impl Decoder {
             return Err(corrupt("there is no base mesh that blocks could be added to one by one"));
         };
         let short = || corrupt("a block is shorter than the index says");
-        let (fields, kinds) = (info.fields.len(), [payload::section_of(info.kind), Kind::FLDU]);
+        let (fields, kinds) = (info.fields.len(), [Kind::HALF, Kind::FLDU]);
         let mut open = None;
         let mut rest = bytes;
         for part in (0..=fields).filter(|&part| part == 0 || self.head.place(part - 1).is_some()) {
@@ -167,7 +168,7 @@ impl Decoder {
     /// Takes the updates of a block away, none of which may be applied to a mesh.
     ///
     /// # Errors
-    /// If the block is not there, or another one depends on it.
+    /// If the block is not there.
     pub fn drop_block(&mut self, block: u32) -> Result<(), PageError> {
         let Some(mt) = &mut self.mt else { return Err(PageError::Absent { page: block }) };
         mt.remove_page(block)?;

@@ -1,7 +1,6 @@
 //! How many bytes of a file a mesh of some error takes, as the index shows.
 
 use super::Decoder;
-use crate::format::{BlockInfo, Index};
 use crate::mt::{ErrorCode, FieldInfo};
 
 /// A mesh of which error can be had for how many bytes.
@@ -23,31 +22,30 @@ impl ErrorBytes {
 
 impl Decoder {
     /// How many bytes have to come for a mesh whose error in a wanted field, by its place among these, is nowhere above some
-    /// value. Errors fall, bytes grow; the last error is 0. For an error in between, the next entry holds. Empty before the index
-    /// is there.
+    /// value. Errors fall, bytes grow; the last error is 0. For an error in between, the next entry holds. Empty before that is known.
     ///
     /// `fetched` bytes from the start of the file come whatever is asked for, if what stands in front of the blocks is not longer.
     ///
-    /// Files of half-edge and edge-based MTs come by blocks: these are the bytes of exactly the blocks that
+    /// Files of half-edge MTs come by blocks: these are the bytes of exactly the blocks that
     /// [`Session::wanted`](crate::session::Session::wanted) names for such a request of a new session, with the wanted fields. Files of other kinds come
-    /// from front to back: this many bytes are enough. At most two blocks fewer are enough for an error that is lower by an eighth, which
-    /// is by how much the index rounds errors up.
+    /// from front to back and do not say before what is where: the only entry is the whole file.
     pub fn bytes_by_error(&self, place: usize, fetched: u64) -> Vec<ErrorBytes> {
-        let (Some(info), Some(index), Some(head)) = (&self.head.info, &self.head.index, self.head_end())
-        else {
+        let (Some(info), Some(&field)) = (&self.head.info, self.head.wanted.get(place)) else {
             return Vec::new();
         };
-        let Some(&field) = self.head.wanted.get(place) else { return Vec::new() };
+        if !info.kind.is_paged() {
+            return self.total.map(|bytes| ErrorBytes { error: 0.0, bytes }).into_iter().collect();
+        }
+        let (Some(index), Some(head)) = (&self.head.index, self.head_end()) else { return Vec::new() };
         let limit = self.total.unwrap_or(u64::MAX);
         let fetched = fetched.max(head).min(limit);
-        let needed =
-            if info.kind.is_paged() { needed_by_blocks(index, field) } else { needed_in_order(index) };
         let mut is_wanted = vec![false; info.fields.len()];
         self.head.wanted.iter().for_each(|&wanted| is_wanted[wanted] = true);
         // Codes in the index are multiples of 256, or all ones.
         let mut bytes_of = [0_u64; 256];
         let mut at = head;
-        for (block, code) in index.blocks.iter().zip(needed) {
+        for block in &index.blocks {
+            let code = block.errors[field];
             for (part, &length) in block.lengths.iter().enumerate() {
                 let end = at.saturating_add(u64::from(length));
                 if part == 0 || is_wanted[part - 1] {
@@ -72,28 +70,4 @@ impl Decoder {
 /// The error that a byte of the index stands for.
 fn error_of(code: u8) -> f64 {
     if code == u8::MAX { f64::INFINITY } else { ErrorCode(u16::from(code) << 8).error() }
-}
-
-/// For each block the error below which a request needs it: the largest of its own and of those that depend on it.
-fn needed_by_blocks(index: &Index, field: usize) -> Vec<ErrorCode> {
-    let mut needed: Vec<ErrorCode> = index.blocks.iter().map(|block| block.errors[field]).collect();
-    for (at, block) in index.blocks.iter().enumerate().rev() {
-        for &parent in &block.parents {
-            needed[parent as usize] = needed[parent as usize].max(needed[at]);
-        }
-    }
-    needed
-}
-
-/// The same where the file is read in order: whether a block was the last that is needed is known when the next one is there.
-/// Until then any field may still have the largest error of the last update.
-fn needed_in_order(index: &Index) -> Vec<ErrorCode> {
-    let largest = |block: &BlockInfo| block.errors.iter().copied().max().unwrap_or(ErrorCode::ZERO);
-    let mut needed: Vec<ErrorCode> = index.blocks.iter().map(largest).collect();
-    for at in (1..needed.len()).rev() {
-        needed[at - 1] = needed[at - 1].max(needed[at]);
-    }
-    needed.insert(0, ErrorCode::MAX);
-    needed.truncate(index.blocks.len());
-    needed
 }

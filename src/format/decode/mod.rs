@@ -5,8 +5,9 @@ mod curve;
 mod sections;
 
 use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, may_be_mt, parse_header};
+use super::payload::Metadata;
+use super::payload::codec::InOrder;
 use super::payload::exact::Corrections;
-use super::payload::{Metadata, State};
 use super::read::Reader;
 use super::{FormatError, Index, Limits, checksum};
 use crate::geom::{Bounds, lattice_box};
@@ -74,7 +75,7 @@ enum Stage {
 pub struct DecodeOptions {
     /// What it may take.
     pub limits: Limits,
-    /// The fields that are wanted, by name; all if none is named. Files of half-edge and edge-based MTs have every field in
+    /// The fields that are wanted, by name; all if none is named. Files of half-edge MTs have every field in
     /// sections of its own, and those of others need not be fetched; the other kinds come with all fields.
     pub fields: Vec<String>,
     /// Whether blocks are going to come by [`Decoder::take_block`], so that not all of them need to fit the limits at
@@ -87,7 +88,7 @@ pub struct DecodeOptions {
 /// Only the section in flight is kept as bytes. Every section's checksum is verified before its content is used.
 /// After an error the MT stays usable as far as it came, and all further bytes give the same error.
 ///
-/// The blocks of a half-edge or edge-based MT may also come in another order, each as a whole: see [`Decoder::take_block`].
+/// The blocks of a half-edge MT may also come in another order, each as a whole: see [`Decoder::take_block`].
 #[derive(Debug)]
 pub struct Decoder {
     options: DecodeOptions,
@@ -102,8 +103,8 @@ pub struct Decoder {
     metadata: Metadata,
     head: FileHead,
     mt: Option<Mt>,
-    /// For a vertex-based MT, what its updates are read with.
-    state: Option<State>,
+    /// What reads the updates of an MT whose blocks come in order.
+    in_order: Option<Box<dyn InOrder>>,
     /// The number of the block that comes next.
     next_block: u32,
     block: Option<OpenBlock>,
@@ -134,7 +135,7 @@ impl Decoder {
             metadata: Metadata::new(),
             head: FileHead::default(),
             mt: None,
-            state: None,
+            in_order: None,
             next_block: 0,
             block: None,
             exact: Vec::new(),
@@ -186,7 +187,8 @@ impl Decoder {
         self.head.info.as_ref()
     }
 
-    /// What is in which block; none before that section is there. Errors and ranges are those of all fields of the file.
+    /// What is in which block of a half-edge MT; none before that section is there, and in files of other kinds. Errors and ranges are
+    /// those of all fields of the file.
     pub fn index(&self) -> Option<&Index> {
         self.head.index.as_ref()
     }
@@ -219,16 +221,21 @@ impl Decoder {
         self.head.histograms.as_ref()?.shares(*field)
     }
 
-    /// The box around the reference mesh, in model units: all meshes of the MT are in it. None before the base mesh is there. Files of
-    /// the first minor versions do not state it; then it is the box around the base mesh and all blocks as the index has them, which
-    /// may be larger by a 256th of the lattice at each side.
+    /// The box around the reference mesh, in model units: all meshes of the MT are in it. None before the base mesh is there. A file
+    /// need not state it; then it is the box around the base mesh and all blocks as the index has them, which
+    /// may be larger by a 256th of the lattice at each side; where there is no index, it is that of the whole lattice.
     pub fn bounds(&self) -> Option<Bounds> {
         let (info, mt) = (self.head.info.as_ref()?, self.mt.as_ref()?);
         if let Some(bounds) = info.model_bounds() {
             return Some(bounds);
         }
-        let blocks = self.head.index.iter().flat_map(|index| &index.blocks).flat_map(|block| block.bounds);
-        let bounds = lattice_box(mt.base().positions.iter().copied().chain(blocks));
+        let bounds = match &self.head.index {
+            None => Some([[0; 3], [1 << info.lattice.bits; 3]]),
+            Some(index) => {
+                let blocks = index.blocks.iter().flat_map(|block| block.bounds);
+                lattice_box(mt.base().positions.iter().copied().chain(blocks))
+            }
+        };
         MtInfo { bounds, ..info.clone() }.model_bounds()
     }
 

@@ -2,12 +2,12 @@
 
 use super::{Decoder, Stage};
 use crate::format::coder::{Models, Source};
-use crate::format::header::{HEAD_BYTES, Kind, SectionHead, Start, VERSION_AT, version_for};
-use crate::format::payload::bounds;
-use crate::format::payload::edge::FieldPart;
+use crate::format::header::{HEAD_BYTES, Kind, SectionHead, Start};
+use crate::format::payload::codec::{KindCodec, codec_of, read_bounds};
 use crate::format::payload::exact::Corrections;
+use crate::format::payload::half_edge::{self, Insertions};
 use crate::format::payload::histogram::Histograms;
-use crate::format::payload::{BaseParts, Shared};
+use crate::format::payload::{BaseParts, FieldPart, bounds, index};
 use crate::format::read::Reader;
 use crate::format::{BlockInfo, FormatError, Index, payload};
 use crate::mt::{ErrorCode, Mt, MtInfo, MultiTessellation, UpdatePages};
@@ -20,6 +20,7 @@ pub(super) struct FileHead {
     pub(super) info: Option<MtInfo>,
     /// Which of them are wanted.
     pub(super) wanted: Vec<usize>,
+    /// In files of half-edge MTs.
     pub(super) index: Option<Index>,
     /// Where the index ends in the file.
     pub(super) index_end: u64,
@@ -27,6 +28,8 @@ pub(super) struct FileHead {
     pub(super) models: Option<Models>,
     /// Until all wanted fields are there; then it is in the MT.
     pub(super) base: Option<BaseParts>,
+    /// log2 of the updates of a block; once the base mesh is there.
+    pub(super) block_bits: u32,
     /// How many fields' levels of the base mesh have been seen.
     pub(super) base_fields: usize,
     pub(super) start: Start,
@@ -38,6 +41,16 @@ impl FileHead {
         let info = self.info.as_ref()?;
         let fields = self.wanted.iter().filter_map(|&f| info.fields.get(f).cloned()).collect();
         Some(MtInfo { fields, ..info.clone() })
+    }
+
+    /// The codec of the kind of MT, once the description is there.
+    fn codec(&self) -> Option<&'static KindCodec> {
+        codec_of(self.info.as_ref()?.kind)
+    }
+
+    /// Whether all is here that stands in front of histograms: the description, and the index where there is one.
+    fn is_described(&self) -> bool {
+        self.info.as_ref().is_some_and(|info| self.index.is_some() || !info.kind.is_paged())
     }
 
     /// The place among the wanted fields of a field of the file.
@@ -64,7 +77,7 @@ impl FileHead {
         open.seen = expected + 1;
         let (Some(place), Some(models)) = (self.place(expected), &self.models) else { return Ok(()) };
         let mut source = Source::new(content, models)?;
-        open.fields[place] = Some(open.shared.read_field(&mut source, open.updates.len() as u32)?);
+        open.fields[place] = Some(half_edge::read_field(&mut source, open.updates.len() as u32)?);
         source.end()
     }
 
@@ -81,12 +94,12 @@ impl FileHead {
     }
 }
 
-/// A block of which not all has arrived.
+/// A block of a half-edge MT of which not all has arrived.
 #[derive(Debug)]
 pub(super) struct OpenBlock {
     pub(super) block: u32,
     pub(super) updates: Range<u32>,
-    pub(super) shared: Shared,
+    pub(super) shared: Insertions,
     /// How many fields have been seen.
     pub(super) seen: usize,
     /// The wanted ones of them.
@@ -104,17 +117,13 @@ impl Decoder {
             Kind::MODL => self.open_models(content)?,
             Kind::BASE => self.open_base(content)?,
             Kind::FLDB => self.open_base_field(content)?,
-            Kind::UPDT | Kind::HALF if self.block.is_none() => {
-                let expected = self.head.info.as_ref().map(|info| payload::section_of(info.kind));
-                if expected != Some(head.kind) {
-                    return Err(content.out_of_place());
-                }
+            Kind::HALF if self.block.is_none() && self.takes_blocks() => {
                 let open = self.read_shared(content, None)?;
                 self.next_block += 1;
                 self.block = Some(open);
             }
             Kind::FLDU => self.open_field(content)?,
-            Kind::INSV | Kind::EXPL => self.open_columns(head.kind, content)?,
+            Kind::UPDT | Kind::INSV => self.open_in_order(head.kind, content)?,
             Kind::EXACT if self.mt.is_some() && self.block.is_none() => self.open_exact(content)?,
             Kind::ENDF if self.mt.is_some() && self.block.is_none() => return self.end(content),
             kind if kind.is_known() => return Err(content.out_of_place()),
@@ -136,12 +145,11 @@ impl Decoder {
         }
         let offset = self.bytes;
         let (info, metadata) = payload::read_info(content)?;
-        if self.head.start.version[0] < version_for(info.kind, false, false)[0] {
-            let what = "the version of the file does not go with the kind of MT in it";
-            return Err(FormatError::Corrupt { offset: VERSION_AT, what });
-        }
-        if self.head.start.tet_errors && info.kind.is_paged() {
-            let what = "errors of tetrahedra in an MT that comes in pages";
+        let Some(codec) = codec_of(info.kind) else {
+            return Err(FormatError::Corrupt { offset, what: "the kind of MT is not known" });
+        };
+        if self.head.start.tet_errors && !codec.has_tet_errors {
+            let what = "errors of tetrahedra in an MT of a kind that has none";
             return Err(FormatError::UnsupportedFeature { offset, what });
         }
         let names = &self.options.fields;
@@ -152,21 +160,26 @@ impl Decoder {
         let all = names.is_empty() || !info.kind.is_paged();
         let is_wanted = |f: &usize| all || names.contains(&info.fields[*f].name);
         self.head.wanted = (0..info.fields.len()).filter(is_wanted).collect();
-        if !self.options.in_parts {
-            // Refuse at once what cannot fit, not after half of it has been fetched.
-            payload::check_memory(&info, [0; 2], info.updates, &self.options.limits)?;
-        }
+        // Refuse at once what cannot fit, not after half of it has been fetched.
+        payload::check_memory((&info, codec), [0; 2], self.most_at_once(&info), &self.options.limits)?;
         self.head.info = Some(info);
         self.metadata = metadata;
         Ok(())
+    }
+
+    /// Updates that are going to be in memory at once.
+    fn most_at_once(&self, info: &MtInfo) -> u32 {
+        if self.options.in_parts && info.kind.is_paged() { 0 } else { info.updates }
     }
 
     pub(super) fn open_index(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let FileHead { info: Some(info), index: index @ None, .. } = &mut self.head else {
             return Err(content.out_of_place());
         };
-        let parts = if info.kind.is_paged() { 1 + info.fields.len() } else { 1 };
-        *index = Some(Index::read(content, info, parts)?);
+        if !info.kind.is_paged() {
+            return Err(content.out_of_place());
+        }
+        *index = Some(Index::read(content, info)?);
         self.head.index_end = self.bytes;
         Ok(())
     }
@@ -174,11 +187,11 @@ impl Decoder {
     pub(super) fn open_histograms(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let fields = self.head.fields();
         let has_bounds = self.head.info.as_ref().is_some_and(|info| info.bounds.is_some());
-        let FileHead { index: Some(_), histograms: histograms @ None, models: None, .. } = &mut self.head
-        else {
+        let in_place = self.head.is_described() && !has_bounds;
+        let FileHead { histograms: histograms @ None, models: None, .. } = &mut self.head else {
             return Err(content.out_of_place());
         };
-        if has_bounds {
+        if !in_place {
             return Err(content.out_of_place());
         }
         *histograms = Some(Histograms::read(content, fields)?);
@@ -186,10 +199,11 @@ impl Decoder {
     }
 
     pub(super) fn open_bounds(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
-        let FileHead { info: Some(info), index: Some(_), models: None, .. } = &mut self.head else {
+        let is_described = self.head.is_described();
+        let FileHead { info: Some(info), models: None, .. } = &mut self.head else {
             return Err(content.out_of_place());
         };
-        if info.bounds.is_some() {
+        if info.bounds.is_some() || !is_described {
             return Err(content.out_of_place());
         }
         info.bounds = Some(bounds::read(content, info.lattice.bits)?);
@@ -197,23 +211,27 @@ impl Decoder {
     }
 
     pub(super) fn open_models(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
-        let FileHead { info: Some(info), index: Some(_), models: models @ None, .. } = &mut self.head else {
+        let codec = self.head.codec().filter(|_| self.head.is_described());
+        let (Some(codec), FileHead { models: models @ None, .. }) = (codec, &mut self.head) else {
             return Err(content.out_of_place());
         };
-        *models = Some(Models::read(content, &payload::families(info.kind))?);
+        let families: Vec<_> = codec.parts().into_iter().map(|(_, family)| family).collect();
+        *models = Some(Models::read(content, &families)?);
         Ok(())
     }
 
     pub(super) fn open_base(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let in_place = self.head.base_fields == 0 && self.mt.is_none();
-        let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
-        let (FileHead { info: Some(info), models: Some(models), base: base @ None, .. }, true) =
-            (&mut self.head, in_place)
+        let bits = self.head.index.as_ref().map(|index| index.block_bits);
+        let (FileHead { info: Some(info), models: Some(models), base: None, .. }, Some(codec), true) =
+            (&self.head, self.head.codec(), in_place)
         else {
             return Err(content.out_of_place());
         };
-        let updates = if self.options.in_parts { 0 } else { info.updates };
-        *base = Some(payload::read_base(content, info, models, updates, bits, &self.options.limits)?);
+        let updates = self.most_at_once(info);
+        let base = payload::read_base(content, (info, codec), models, updates, bits, &self.options.limits)?;
+        self.head.block_bits = base.block_bits;
+        self.head.base = Some(base);
         Ok(())
     }
 
@@ -228,18 +246,17 @@ impl Decoder {
         if let (true, FileHead { base: Some(base), models: Some(models), .. }) = (is_wanted, &mut self.head) {
             base.read_field(content, models)?;
         }
-        if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
-            let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
-            if let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info()) {
-                let (mut mt, state) = base.start(info, bits, self.head.start.tet_errors)?;
-                if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
-                    let wanted = &self.head.wanted;
-                    let of_block =
-                        |block: &BlockInfo| wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
-                    mt.set_page_bounds(index.blocks.iter().flat_map(of_block).collect());
-                }
-                (self.mt, self.state) = (Some(mt), state);
+        if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len())
+            && let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info())
+        {
+            let (mut mt, in_order) = base.start(info, self.head.start.tet_errors)?;
+            if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
+                let wanted = &self.head.wanted;
+                let of_block =
+                    |block: &BlockInfo| wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
+                mt.set_page_bounds(index.blocks.iter().flat_map(of_block).collect());
             }
+            (self.mt, self.in_order) = (Some(mt), in_order);
         }
         Ok(())
     }
@@ -250,7 +267,7 @@ impl Decoder {
         content: &mut Reader<'_>,
         expected: Option<u32>,
     ) -> Result<(u32, Range<u32>), FormatError> {
-        let (Some(index), Some(info)) = (&self.head.index, &self.head.info) else {
+        let Some(info) = &self.head.info else {
             return Err(content.out_of_place());
         };
         let in_place = self.mt.is_some() && self.head.base_fields == info.fields.len();
@@ -258,7 +275,7 @@ impl Decoder {
         if !in_place && expected.is_none() || block != expected.unwrap_or(self.next_block) {
             return Err(content.corrupt("a block of updates is missing or repeated"));
         }
-        let updates = index.updates(block, info.updates);
+        let updates = index::updates_of(self.head.block_bits, block, info.updates);
         if updates.is_empty() {
             return Err(content.corrupt("there are more updates than the description says"));
         }
@@ -271,11 +288,12 @@ impl Decoder {
         expected: Option<u32>,
     ) -> Result<OpenBlock, FormatError> {
         let (block, updates) = self.next_updates(&mut content, expected)?;
-        let (Some(mt), Some(models)) = (&self.mt, &self.head.models) else {
+        let (Some(info), Some(models)) = (&self.head.info, &self.head.models) else {
             return Err(content.out_of_place());
         };
+        let (bits, limits) = (self.head.block_bits, &self.options.limits);
         let mut source = Source::new(content, models)?;
-        let shared = Shared::read(&mut source, mt, updates.clone(), &self.options.limits)?;
+        let shared = half_edge::read(&mut source, info, bits, updates.clone(), limits)?;
         source.end()?;
         let fields = self.head.wanted.iter().map(|_| None).collect();
         Ok(OpenBlock { block, updates, shared, seen: 0, fields })
@@ -298,8 +316,9 @@ impl Decoder {
         let OpenBlock { block, shared, fields, .. } = open;
         let fields: Vec<FieldPart> = fields.into_iter().flatten().collect();
         let Some(mt) = &mut self.mt else { return Ok(()) };
-        shared.check_memory(mt, &self.options.limits)?;
-        shared.insert(mt, block, &fields)?;
+        if let Mt::HalfEdge(mt) = mt {
+            shared.insert(mt, block, &fields, &self.options.limits)?;
+        }
         mt.set_to_come(&self.head.largest_of_others(mt));
         Ok(())
     }
@@ -322,15 +341,17 @@ impl Decoder {
         Ok(())
     }
 
-    pub(super) fn open_columns(&mut self, kind: Kind, mut content: Reader<'_>) -> Result<(), FormatError> {
+    /// A block of updates that come in order.
+    pub(super) fn open_in_order(&mut self, kind: Kind, mut content: Reader<'_>) -> Result<(), FormatError> {
         let (_, updates) = self.next_updates(&mut content, None)?;
-        match &mut self.mt {
-            Some(mt) if kind == payload::section_of(mt.info().kind) => {
+        let is_expected = self.head.codec().is_some_and(|codec| codec.section == kind);
+        match (&mut self.mt, &mut self.in_order, &self.head.models) {
+            (Some(mt), Some(in_order), Some(models)) if is_expected => {
                 self.next_block += 1;
-                let Some(models) = &self.head.models else { return Ok(()) };
                 let mut source = Source::new(content, models)?;
-                let count = updates.len() as u32;
-                payload::read_updates(&mut source, mt, count, self.state.as_mut(), &self.options.limits)?;
+                let behind = read_bounds(&mut source, mt.info().fields.len())?;
+                in_order.read(&mut source, mt, updates.len() as u32, &self.options.limits)?;
+                mt.set_to_come(&behind);
                 source.end()
             }
             _ => Err(content.out_of_place()),
@@ -344,9 +365,6 @@ impl Decoder {
         if totals.updates != updates || updates != expected {
             return Err(self.corrupt("updates are missing"));
         }
-        if let Some(mt) = &self.mt {
-            payload::check_reference(mt)?;
-        }
         if totals.sections != self.sections || totals.crc != self.chain.clone().finalize() {
             return Err(self.corrupt("sections are missing or repeated"));
         }
@@ -354,7 +372,7 @@ impl Decoder {
             return Err(self.corrupt("the file is shorter than its header says"));
         }
         self.stage = Stage::End;
-        self.state = None;
+        self.in_order = None;
         Ok(())
     }
 }

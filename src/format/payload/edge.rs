@@ -1,41 +1,46 @@
-//! `UPDT` of an edge-based MT: a block of vertex splits, and `FLDU`: what they do to one field.
+//! `UPDT` of an edge-based MT: a block of vertex splits, and what they do to each field.
 //!
 //! Nothing here needs a mesh. Offsets, sides and levels are residuals, see [`EdgeUpdate`](crate::mt::EdgeUpdate); vertices
 //! are coded as a forest: a split is listed with the split in the same block that created its
 //! vertex, or else among the roots.
 
-use super::base;
-use crate::format::FormatError;
-use crate::format::coder::{Family, Put, Source};
+use super::changes::{FieldPart, put_changes, range_of, read_changes};
+use super::codec::{Codec, Head, InOrder, Parts, Started, put_in_order, sections_in_order};
+use super::{base, check_bytes};
+use crate::format::coder::{Family, Models, Put, Source};
+use crate::format::header::Kind;
+use crate::format::section::Section;
+use crate::format::{EncodeError, FormatError, Limits};
 use crate::mt::{
-    BaseMeshError, EdgeMt, ErrorCode, MAX_EDGE, MtInfo, MultiTessellation, PageError, UpdateId, UpdatePages,
-    VertexId,
+    BaseMesh, BaseMeshError, EdgeMt, EdgeUpdate, ErrorCode, MAX_EDGE, Mt, MtInfo, MtKind, MultiTessellation,
+    UpdateId, VertexId,
 };
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Distances from the vertex of one root to that of the next.
-pub const GAP: Family = base::LAST.numbers_after(1, 1);
+const GAP: Family = base::LAST.numbers_after(1, 1);
 /// The runs that the roots are in.
-pub const RUN: Family = GAP.numbers_after(1, 3);
+const RUN: Family = GAP.numbers_after(1, 3);
 /// Which of the two vertices that a split creates are split in the same block.
-pub const CHILDREN: Family = RUN.after(1, 4);
+const CHILDREN: Family = RUN.after(1, 4);
 /// How many runs later that is, beyond the next.
-pub const RISE: Family = CHILDREN.numbers_after(1, 3);
+const RISE: Family = CHILDREN.numbers_after(1, 3);
 /// The edge of the link that an offset is counted from, by whether that one split higher is from one.
-pub const EDGE: Family = RISE.numbers_after(3, 3);
+const EDGE: Family = RISE.numbers_after(3, 3);
 /// Components of offsets, by the length of the same component one split higher; apart for those counted from an edge.
-pub const OFFSET: Family = EDGE.numbers_after(68, 2);
+const OFFSET: Family = EDGE.numbers_after(68, 2);
 /// One more than the last place where a guess of sides is wrong.
-pub const LAST_WRONG: Family = OFFSET.after(1, 65);
+const LAST_WRONG: Family = OFFSET.after(1, 65);
 /// Whether the guess is wrong at a place before that.
-pub const WRONG: Family = LAST_WRONG.after(WRONG_ROWS * WRONG_COLUMNS, 2);
+const WRONG: Family = LAST_WRONG.after(WRONG_ROWS * WRONG_COLUMNS, 2);
 /// How far the upper byte of an error is below the largest of its block, by that of the split before.
-pub const ERROR: Family = WRONG.after(16, 256);
+const ERROR: Family = WRONG.after(16, 256);
 /// What is wrong with the guess of a field's offset, by error.
 pub const LEVEL: Family = ERROR.numbers_after(128, 1);
 
 /// All families, with names for what they tell.
-pub const PARTS: [(&str, Family); 10] = [
+const PARTS: Parts = &[
     ("partial order", GAP),
     ("partial order", RUN),
     ("partial order", CHILDREN),
@@ -51,48 +56,103 @@ pub const PARTS: [(&str, Family); 10] = [
 const WRONG_ROWS: u32 = 12;
 const WRONG_COLUMNS: u32 = 11;
 
-/// Which of the ranges that end with these numbers a number is in; what is larger is in one more.
-pub fn range_of(number: u32, ends: &[u32]) -> u32 {
-    ends.partition_point(|&end| end < number) as u32
-}
-
 /// The context for place `place` in front of the last wrong one, `last`.
 fn wrong_context(last: u32, place: u32) -> u32 {
     let row = range_of(last, &[1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 24]);
     row * WRONG_COLUMNS + range_of(place, &[0, 1, 2, 3, 4, 5, 6, 7, 11, 15])
 }
 
-/// Bytes that an update takes in memory.
-pub fn update_bytes(fields: u64) -> u64 {
-    38 + 6 * fields
+impl Codec for EdgeMt {
+    const KIND: MtKind = MtKind::Edge;
+    const NUMBER: u8 = 0;
+    const SECTION: Kind = Kind::UPDT;
+    const PARTS: Parts = PARTS;
+
+    /// A split turns one vertex into two, and vertex numbers are 32-bit words of which one means "none".
+    fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+        let updates = u64::from(info.updates);
+        if base_vertices + updates != u64::from(info.vertices) {
+            return Err(BaseMeshError::Info(
+                "base vertices and updates do not add up to the reference vertices",
+            ));
+        }
+        if base_vertices + 2 * updates >= u64::from(u32::MAX) {
+            return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
+        }
+        Ok(())
+    }
+
+    fn least_update_bytes(info: &MtInfo) -> u64 {
+        38 + 6 * info.fields.len() as u64
+    }
+
+    fn put_head(&self, _: &mut impl Put) {}
+
+    fn read_head(
+        _: &mut Source<'_>,
+        _: &MtInfo,
+        _: [u32; 2],
+        _: u32,
+        _: &Limits,
+    ) -> Result<Box<dyn Head>, FormatError> {
+        Ok(Box::new(Splitting))
+    }
+
+    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
+        put_in_order(out, self, |out, updates| {
+            put(out, self, updates);
+            Ok(())
+        })
+    }
+
+    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
+        sections_in_order(self, models, |out, updates| {
+            put(out, self, updates);
+            Ok(())
+        })
+    }
 }
 
-/// A split turns one vertex into two, and vertex numbers are 32-bit words of which one means "none".
-pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
-    let updates = u64::from(info.updates);
-    if base_vertices + updates != u64::from(info.vertices) {
-        return Err(BaseMeshError::Info("base vertices and updates do not add up to the reference vertices"));
+/// Nothing stands behind the base mesh, and nothing is kept from one block to the next.
+#[derive(Debug)]
+struct Splitting;
+
+impl Head for Splitting {
+    fn start(
+        self: Box<Self>,
+        info: MtInfo,
+        base: BaseMesh,
+        block_bits: u32,
+        _: bool,
+    ) -> Result<Started, FormatError> {
+        let mut mt = EdgeMt::new(info, base);
+        mt.set_page_bits(block_bits);
+        Ok((mt.into(), Some(self)))
     }
-    if base_vertices + 2 * updates >= u64::from(u32::MAX) {
-        return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
+}
+
+impl InOrder for Splitting {
+    fn read(
+        &mut self,
+        source: &mut Source<'_>,
+        mt: &mut Mt,
+        count: u32,
+        limits: &Limits,
+    ) -> Result<(), FormatError> {
+        match mt {
+            Mt::Edge(mt) => read(source, mt, count, limits),
+            _ => Err(source.corrupt("a section is out of place")),
+        }
     }
-    Ok(())
 }
 
 /// The splits of a block without what they do to fields.
 #[derive(Clone, Debug, Default)]
-pub struct Splits {
-    pub vertices: Vec<u32>,
+struct Splits {
+    vertices: Vec<u32>,
     /// With the edges that they are counted from.
-    pub offsets: Vec<Offset>,
-    pub masks: Vec<u64>,
-}
-
-/// What updates of a block do to one field.
-#[derive(Clone, Debug, Default)]
-pub struct FieldPart {
-    pub errors: Vec<ErrorCode>,
-    pub residuals: Vec<i32>,
+    offsets: Vec<Offset>,
+    masks: Vec<u64>,
 }
 
 /// The vertices that splits before the block have created, and those of the base mesh.
@@ -114,17 +174,27 @@ fn runs(mt: &EdgeMt, first: u32, vertices: &[u32]) -> Vec<u32> {
     runs
 }
 
-/// Puts the splits `first .. end` of an MT.
-pub fn put(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32) {
-    let vertices: Vec<u32> = (first..end).map(|k| mt.split_vertex(UpdateId(k)).0).collect();
-    put_vertices(out, mt, first, &vertices);
+/// Puts a block of an MT.
+fn put(out: &mut impl Put, mt: &EdgeMt, updates: Range<u32>) {
+    put_splits(out, mt, updates.clone());
+    for field in 0..mt.info().fields.len() {
+        put_changes(out, [ERROR, LEVEL], updates.clone().map(UpdateId), |u| {
+            (mt.error_of_field(u, field), mt.level_residuals(u).nth(field).unwrap_or(0))
+        });
+    }
+}
+
+/// Puts updates without what they do to fields.
+fn put_splits(out: &mut impl Put, mt: &EdgeMt, updates: Range<u32>) {
+    let vertices: Vec<u32> = updates.clone().map(|k| mt.split_vertex(UpdateId(k)).0).collect();
+    put_vertices(out, mt, updates.start, &vertices);
     let leads = |k| {
         let (offset, edge) = offset_of(mt, UpdateId(k));
         edge != 0 || offset.into_iter().find(|&d| d != 0).is_none_or(|d| d > 0)
     };
-    let all_lead = (first..end).all(leads);
+    let all_lead = updates.clone().all(leads);
     out.bits(u32::from(all_lead), 1);
-    for k in first..end {
+    for k in updates {
         let update = mt.update_without_levels(UpdateId(k));
         let above = mt.created_by(update.vertex).map(|u| offset_of(mt, u));
         put_offset(out, above, offset_of(mt, UpdateId(k)), all_lead);
@@ -163,7 +233,7 @@ fn put_vertices(out: &mut impl Put, mt: &EdgeMt, first: u32, vertices: &[u32]) {
 }
 
 /// An offset, and the edge of the link that it is counted from.
-pub type Offset = ([i32; 3], u8);
+type Offset = ([i32; 3], u8);
 
 fn offset_of(mt: &EdgeMt, u: UpdateId) -> Offset {
     let update = mt.update_without_levels(u);
@@ -201,39 +271,32 @@ fn put_mask(out: &mut impl Put, mask: u64) {
     }
 }
 
-/// Puts what the splits `first .. end` of an MT do to a field.
-pub fn put_field(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32, field: usize) {
-    put_changes(out, [ERROR, LEVEL], (first..end).map(UpdateId), |u| {
-        (mt.error_of_field(u, field), mt.level_residuals(u).nth(field).unwrap_or(0))
-    });
-}
-
-/// Puts errors and residuals of levels, update by update, by the families of both.
-pub fn put_changes(
-    out: &mut impl Put,
-    [error, level]: [Family; 2],
-    updates: impl Iterator<Item = UpdateId> + Clone,
-    change: impl Fn(UpdateId) -> (ErrorCode, i32),
-) {
-    let codes = updates.clone().map(|u| change(u).0.0);
-    let (largest, is_fine) =
-        codes.fold((0, false), |(largest, fine), code| (largest.max(code >> 8), fine || code & 0xFF != 0));
-    out.bits(u32::from(largest), 8);
-    out.bits(u32::from(is_fine), 1);
-    let mut before = 0;
-    for (ErrorCode(code), residual) in updates.map(change) {
-        let fall = u32::from(largest - (code >> 8));
-        out.symbol(error, before, fall);
-        if is_fine {
-            out.bits(u32::from(code & 0xFF), 8);
-        }
-        before = fall;
-        out.signed(level, u32::from(code >> 9), residual);
+/// Reads the next `count` updates into the MT.
+fn read(source: &mut Source<'_>, mt: &mut EdgeMt, count: u32, limits: &Limits) -> Result<(), FormatError> {
+    let fields = mt.info().fields.len();
+    check_bytes(mt.bytes() + u64::from(count) * EdgeMt::least_update_bytes(mt.info()), limits)?;
+    let splits = read_splits(source, mt, count)?;
+    let changes: Vec<FieldPart> =
+        (0..fields).map(|_| read_changes(source, [ERROR, LEVEL], count)).collect::<Result<_, _>>()?;
+    for k in 0..count as usize {
+        let level_residuals: Vec<i32> = changes.iter().map(|field| field.residuals[k]).collect();
+        let errors: Vec<ErrorCode> = changes.iter().map(|field| field.errors[k]).collect();
+        let (offset_residual, edge) = splits.offsets[k];
+        mt.push(&EdgeUpdate {
+            vertex: VertexId(splits.vertices[k]),
+            offset_residual,
+            edge,
+            level_residuals: level_residuals.into(),
+            wrong_sides: splits.masks[k],
+            errors: &errors,
+        })?;
     }
+    Ok(())
 }
 
-/// Reads the splits `first .. first + count`; the blocks in which their vertices were created must be in the MT.
-pub fn read(source: &mut Source<'_>, mt: &EdgeMt, first: u32, count: u32) -> Result<Splits, FormatError> {
+/// Reads updates without what they do to fields.
+fn read_splits(source: &mut Source<'_>, mt: &EdgeMt, count: u32) -> Result<Splits, FormatError> {
+    let first = mt.updates();
     let mut splits = Splits { vertices: read_vertices(source, mt, first, count)?, ..Splits::default() };
     let leads = source.bits(1)? == 1;
     let old = vertices_before(mt, first);
@@ -241,23 +304,13 @@ pub fn read(source: &mut Source<'_>, mt: &EdgeMt, first: u32, count: u32) -> Res
         let v = splits.vertices[at];
         let above = match v.checked_sub(old) {
             Some(inside) => splits.offsets.get(inside as usize / 2).copied(),
-            None => offset_above(mt, first, VertexId(v))?,
+            None => mt.created_by(VertexId(v)).map(|u| offset_of(mt, u)),
         };
         let offset = read_offset(source, above, leads)?;
         splits.offsets.push(offset);
         splits.masks.push(read_mask(source)?);
     }
     Ok(splits)
-}
-
-/// The offset of the split that created a vertex before block `first` began; none for a vertex of the base mesh.
-fn offset_above(mt: &EdgeMt, first: u32, vertex: VertexId) -> Result<Option<Offset>, FormatError> {
-    let Some(creator) = mt.created_by(vertex) else { return Ok(None) };
-    if mt.has(creator) {
-        return Ok(Some(offset_of(mt, creator)));
-    }
-    let [page, other] = [first, creator.0].map(|u| u >> mt.page_bits());
-    Err(FormatError::Page(PageError::Needs { page, other }))
 }
 
 fn read_vertices(
@@ -326,24 +379,4 @@ fn read_mask(source: &mut Source<'_>) -> Result<u64, FormatError> {
         mask |= u64::from(source.symbol(WRONG, wrong_context(last, place))?) << place;
     }
     Ok(mask)
-}
-
-/// Reads what [`put_changes`] puts of `count` updates.
-pub fn read_changes(
-    source: &mut Source<'_>,
-    [error, level]: [Family; 2],
-    count: u32,
-) -> Result<FieldPart, FormatError> {
-    let largest = source.bits(8)?;
-    let is_fine = source.bits(1)? == 1;
-    let (mut part, mut before) = (FieldPart::default(), 0);
-    for _ in 0..count {
-        let fall = source.symbol(error, before)?;
-        let upper = largest.checked_sub(fall).ok_or_else(|| source.corrupt("an error is below zero"))?;
-        let lower = if is_fine { source.bits(8)? } else { 0 };
-        before = fall;
-        part.errors.push(ErrorCode((upper << 8 | lower) as u16));
-        part.residuals.push(source.signed(level, upper >> 1)?);
-    }
-    Ok(part)
 }

@@ -4,49 +4,53 @@
 //! updates whose near vertex is its own. What removes the tetrahedra of its star is coded as residuals: see
 //! `mt/half_edge/star_code.rs`.
 
-use super::edge::FieldPart;
-use super::{base, edge};
-use crate::format::coder::{Family, Put, Source};
-use crate::format::{FormatError, Limits};
+use super::changes::{FieldPart, put_changes, range_of, read_changes};
+use super::codec::{Codec, Head, Parts, Started};
+use super::{base, check_bytes};
+use crate::format::coder::{Counts, Family, Models, Put, Source, Writer};
+use crate::format::header::Kind;
+use crate::format::section::Section;
+use crate::format::{EncodeError, FormatError, Limits};
 use crate::mesh::NONE;
 use crate::mt::{
-    BaseMark, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, MtInfo, MultiTessellation, UpdateId,
-    UpdatePages,
+    BaseMark, BaseMesh, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, HalfEdgeUpdate, MtFacts, MtInfo,
+    MtKind, MultiTessellation, UpdateId, UpdatePages,
 };
+use crate::threads;
 use std::ops::Range;
 
 /// One more than the update that removes a base tetrahedron.
-pub const REMOVER: Family = base::LAST.numbers_after(1, 1);
+const REMOVER: Family = base::LAST.numbers_after(1, 1);
 /// Which faces of a base tetrahedron go with it.
-pub const BASE_INNER: Family = REMOVER.after(1, 16);
+const BASE_INNER: Family = REMOVER.after(1, 16);
 /// How many forest children a vertex has.
-pub const CHILDREN: Family = BASE_INNER.numbers_after(1, 2);
+const CHILDREN: Family = BASE_INNER.numbers_after(1, 2);
 /// How many other blocks have been named since the block of a child was named last, 0 for a new one.
-pub const BLOCK: Family = CHILDREN.numbers_after(1, 2);
+const BLOCK: Family = CHILDREN.numbers_after(1, 2);
 /// How far a new block lies behind that of the near vertex, or behind the last new one.
-pub const NEW_BLOCK: Family = BLOCK.numbers_after(1, 1);
+const NEW_BLOCK: Family = BLOCK.numbers_after(1, 1);
 /// Distances between children in a block.
-pub const GAP: Family = NEW_BLOCK.numbers_after(1, 2);
+const GAP: Family = NEW_BLOCK.numbers_after(1, 2);
 /// Components of offsets: the first by the length of the last offset, the others by that of those before.
-pub const OFFSET: Family = GAP.numbers_after(3 * LENGTHS, 2);
+const OFFSET: Family = GAP.numbers_after(3 * LENGTHS, 2);
 /// How many symbols a star has.
-pub const SYMBOLS: Family = OFFSET.after(1, 256);
+const SYMBOLS: Family = OFFSET.after(1, 256);
 /// The symbols by their number and place.
-pub const SYMBOL: Family = SYMBOLS.after(ROWS * COLUMNS, 16);
+const SYMBOL: Family = SYMBOLS.after(ROWS * COLUMNS, 16);
 /// How many bits a star has.
-pub const BITS: Family = SYMBOL.numbers_after(1, 4);
+const BITS: Family = SYMBOL.numbers_after(1, 4);
 /// The bits by their number and place.
-pub const BIT: Family = BITS.after(ROWS * COLUMNS, 2);
+const BIT: Family = BITS.after(ROWS * COLUMNS, 2);
 /// How far the upper byte of an error is below the largest of its block, by that of the update before.
-pub const ERROR: Family = BIT.after(16, 256);
+const ERROR: Family = BIT.after(16, 256);
 /// Residuals of levels, by error.
-pub const LEVEL: Family = ERROR.numbers_after(128, 1);
+const LEVEL: Family = ERROR.numbers_after(128, 1);
 
 /// Lengths of offsets in bits that have contexts of their own; longer ones use the last.
 const LENGTHS: u32 = 22;
 
 /// All families, with names for what they code.
-pub const PARTS: [(&str, Family); 13] = [
+const PARTS: Parts = &[
     ("base mesh", REMOVER),
     ("base mesh", BASE_INNER),
     ("partial order", CHILDREN),
@@ -70,8 +74,8 @@ const COLUMNS: u32 = 8;
 
 /// The context for place `place` of `count`.
 fn place_context(count: u32, place: u32) -> u32 {
-    let row = edge::range_of(count, &[1, 2, 4, 6, 9, 13, 19]);
-    row * COLUMNS + edge::range_of(place, &[0, 1, 2, 4, 7, 11, 16])
+    let row = range_of(count, &[1, 2, 4, 6, 9, 13, 19]);
+    row * COLUMNS + range_of(place, &[0, 1, 2, 4, 7, 11, 16])
 }
 
 /// Bytes that an update takes in memory besides its children and its star code: where these begin, where its near vertex
@@ -80,17 +84,88 @@ fn own_bytes(fields: u64) -> u64 {
     8 + 4 + 6 * fields
 }
 
-/// Bytes that an update takes in memory, at least. Every update is the child of one vertex.
-pub fn least_update_bytes(fields: u64) -> u64 {
-    own_bytes(fields) + size_of::<ForestChild>() as u64
+/// So many blocks are counted together: each table of counts takes memory.
+const COUNTED: usize = 16;
+
+impl Codec for HalfEdgeMt {
+    const KIND: MtKind = MtKind::HalfEdge;
+    const NUMBER: u8 = 3;
+    const SECTION: Kind = Kind::HALF;
+    const PARTS: Parts = PARTS;
+
+    /// Every update inserts one vertex.
+    fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+        if base_vertices + u64::from(info.updates) != u64::from(info.vertices) {
+            return Err(BaseMeshError::Info("vertices are not as many as base vertices and updates"));
+        }
+        Ok(())
+    }
+
+    /// Every update is the child of one vertex.
+    fn least_update_bytes(info: &MtInfo) -> u64 {
+        own_bytes(info.fields.len() as u64) + size_of::<ForestChild>() as u64
+    }
+
+    fn put_head(&self, out: &mut impl Put) {
+        put_head(out, self);
+    }
+
+    fn read_head(
+        source: &mut Source<'_>,
+        info: &MtInfo,
+        counts: [u32; 2],
+        block_bits: u32,
+        limits: &Limits,
+    ) -> Result<Box<dyn Head>, FormatError> {
+        Ok(Box::new(read_head(source, info, counts, block_bits, limits)?))
+    }
+
+    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
+        (0..blocks(self) as u32).for_each(|block| put_block(out, self, block));
+        Ok(())
+    }
+
+    /// Blocks do not depend on each other.
+    fn count_updates(&self) -> Result<Counts, EncodeError> {
+        let of_ranges = threads::map(blocks(self), COUNTED, |blocks| {
+            let mut counts = Counts::default();
+            blocks.for_each(|block| put_block(&mut counts, self, block as u32));
+            counts
+        });
+        let mut all = Counts::default();
+        of_ranges.iter().for_each(|counts| all.add(counts));
+        Ok(all)
+    }
+
+    fn known_facts(&self) -> Option<&MtFacts> {
+        self.facts()
+    }
+
+    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
+        let of_block = |blocks: Range<usize>| sections_of(self, blocks.start as u32, models);
+        threads::map(blocks(self), 1, of_block).into_iter().collect()
+    }
 }
 
-/// Every update inserts one vertex.
-pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
-    if base_vertices + u64::from(info.updates) != u64::from(info.vertices) {
-        return Err(BaseMeshError::Info("vertices are not as many as base vertices and updates"));
-    }
-    Ok(())
+/// How many blocks an MT has.
+fn blocks(mt: &HalfEdgeMt) -> usize {
+    mt.updates().div_ceil(1 << mt.page_bits()) as usize
+}
+
+fn put_block(out: &mut impl Put, mt: &HalfEdgeMt, block: u32) {
+    put(out, mt, mt.page_updates(block));
+    (0..mt.info().fields.len()).for_each(|field| put_field(out, mt, mt.page_updates(block), field));
+}
+
+/// The sections of a block: one that all fields share, and one for each field.
+fn sections_of(mt: &HalfEdgeMt, block: u32, models: &Models) -> Result<Vec<Section>, EncodeError> {
+    let updates = mt.page_updates(block);
+    let shared = Section::coded(HalfEdgeMt::SECTION, &[block], models, |out| put(out, mt, updates.clone()));
+    let of_field = |field: usize| {
+        let put = |out: &mut Writer<'_>| put_field(out, mt, updates.clone(), field);
+        Section::coded(Kind::FLDU, &[block, field as u32], models, put)
+    };
+    std::iter::once(shared).chain((0..mt.info().fields.len()).map(of_field)).collect()
 }
 
 /// What forest children are coded relative to: the blocks named so far, the last first, each with the last child in it.
@@ -206,7 +281,7 @@ fn read_children(
 }
 
 /// Puts what removes the base tetrahedra, and the forest children of the base vertices.
-pub fn put_head(out: &mut impl Put, mt: &HalfEdgeMt) {
+fn put_head(out: &mut impl Put, mt: &HalfEdgeMt) {
     for mark in mt.base_marks() {
         out.number(REMOVER, 0, mark.remover.wrapping_add(1));
         if mark.remover != NONE {
@@ -226,17 +301,29 @@ fn most_children(info: &MtInfo, limits: &Limits) -> u32 {
 }
 
 /// What stands in front of the updates besides the base mesh.
-#[derive(Clone, Debug, Default)]
-pub struct BaseHead {
-    pub marks: Vec<BaseMark>,
-    pub children: Vec<Vec<ForestChild>>,
+#[derive(Debug, Default)]
+struct BaseHead {
+    marks: Vec<BaseMark>,
+    children: Vec<Vec<ForestChild>>,
+}
+
+impl Head for BaseHead {
+    fn start(
+        self: Box<Self>,
+        info: MtInfo,
+        base: BaseMesh,
+        block_bits: u32,
+        _: bool,
+    ) -> Result<Started, FormatError> {
+        Ok((HalfEdgeMt::new(info, base, self.marks, &self.children, block_bits)?.into(), None))
+    }
 }
 
 /// Reads what [`put_head`] puts.
-pub fn read_head(
+fn read_head(
     source: &mut Source<'_>,
     info: &MtInfo,
-    [vertices, tets]: [usize; 2],
+    [vertices, tets]: [u32; 2],
     block_bits: u32,
     limits: &Limits,
 ) -> Result<BaseHead, FormatError> {
@@ -301,10 +388,10 @@ fn read_star(source: &mut Source<'_>, star: &mut Vec<u8>) -> Result<(), FormatEr
     Ok(())
 }
 
-/// Puts the updates `first .. end`, which are a block.
-pub fn put(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32) {
-    let mut named = Named::behind(first >> mt.page_bits());
-    for update in (first..end).filter_map(|u| mt.update(UpdateId(u))) {
+/// Puts updates that are a block, without what they do to fields.
+fn put(out: &mut impl Put, mt: &HalfEdgeMt, updates: Range<u32>) {
+    let mut named = Named::behind(updates.start >> mt.page_bits());
+    for update in updates.filter_map(|u| mt.update(UpdateId(u))) {
         put_children(out, &mut named, update.children, mt.page_bits());
         put_star(out, update.star);
     }
@@ -313,13 +400,40 @@ pub fn put(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32) {
 /// Updates of a block, without what they do to fields.
 #[derive(Clone, Debug, Default)]
 pub struct Insertions {
-    pub children: Vec<Vec<ForestChild>>,
-    pub stars: Vec<Vec<u8>>,
+    children: Vec<Vec<ForestChild>>,
+    stars: Vec<Vec<u8>>,
 }
 
 impl Insertions {
+    /// Adds them to an MT as a page, with what they do to each of its fields.
+    pub fn insert(
+        self,
+        mt: &mut HalfEdgeMt,
+        page: u32,
+        fields: &[FieldPart],
+        limits: &Limits,
+    ) -> Result<(), FormatError> {
+        check_bytes(mt.bytes() + self.bytes(fields.len() as u64), limits)?;
+        let stride = fields.len().max(1);
+        let rows = 0..self.stars.len();
+        let residuals: Vec<i32> =
+            rows.clone().flat_map(|k| fields.iter().map(move |field| field.residuals[k])).collect();
+        let errors: Vec<ErrorCode> =
+            rows.clone().flat_map(|k| fields.iter().map(move |field| field.errors[k])).collect();
+        let changes = rows.zip(residuals.chunks(stride).zip(errors.chunks(stride)));
+        let updates: Vec<HalfEdgeUpdate<'_>> = changes
+            .map(|(k, (level_residuals, errors))| HalfEdgeUpdate {
+                children: &self.children[k],
+                level_residuals,
+                star: &self.stars[k],
+                errors,
+            })
+            .collect();
+        Ok(mt.insert_page(page, &updates)?)
+    }
+
     /// Bytes that they take in memory, in an MT of so many fields.
-    pub fn bytes(&self, fields: u64) -> u64 {
+    fn bytes(&self, fields: u64) -> u64 {
         let children: usize = self.children.iter().map(|row| size_of_val(&row[..])).sum();
         let stars: usize = self.stars.iter().map(Vec::len).sum();
         (children + stars) as u64 + self.stars.len() as u64 * own_bytes(fields)
@@ -347,10 +461,9 @@ pub fn read(
     Ok(insertions)
 }
 
-/// Puts what the updates `first .. end` do to a field.
-pub fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32, field: usize) {
-    let all = (first..end).map(UpdateId);
-    edge::put_changes(out, [ERROR, LEVEL], all, |u| {
+/// Puts what updates do to a field.
+fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, updates: Range<u32>, field: usize) {
+    put_changes(out, [ERROR, LEVEL], updates.map(UpdateId), |u| {
         // Whoever writes an MT has all of its updates.
         mt.update(u)
             .map_or((ErrorCode::ZERO, 0), |update| (update.errors[field], update.level_residuals[field]))
@@ -359,5 +472,5 @@ pub fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32, fiel
 
 /// Reads what the `count` updates of a block do to a field.
 pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart, FormatError> {
-    edge::read_changes(source, [ERROR, LEVEL], count)
+    read_changes(source, [ERROR, LEVEL], count)
 }

@@ -1,12 +1,10 @@
 //! `INDX`: what is in each block and where, so that a client can fetch just the blocks that it needs.
 
+use super::changes::{bound_of, upper_byte};
 use crate::format::read::Reader;
 use crate::format::{FormatError, write};
-use crate::mt::{ErrorCode, MtInfo, MtKind};
+use crate::mt::{ErrorCode, MtInfo};
 use std::ops::Range;
-
-/// Most blocks that a block may depend on directly, so that an index is not larger than its file.
-const MAX_PARENTS: u32 = 1 << 20;
 
 /// What the index of a file says of one block of updates.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -20,8 +18,6 @@ pub struct BlockInfo {
     /// For each field the least and the largest level in the tetrahedra that its updates remove or insert, or a little
     /// less and more.
     pub ranges: Vec<[i32; 2]>,
-    /// The blocks that it depends on directly, ascending; all come before it.
-    pub parents: Vec<u32>,
 }
 
 /// Far more than what stands between index and blocks can take, and far less than places in a file can be.
@@ -53,9 +49,7 @@ pub struct Index {
 impl Index {
     /// The updates of a block of an MT of so many.
     pub fn updates(&self, block: u32, updates: u32) -> Range<u32> {
-        let first = u64::from(block) << self.block_bits;
-        let end = u64::from(updates);
-        first.min(end) as u32..(first + (1 << self.block_bits)).min(end) as u32
+        updates_of(self.block_bits, block, updates)
     }
 
     /// Widens the numbers of the blocks to those that the file can hold.
@@ -72,7 +66,7 @@ impl Index {
                 range[1] = (((range[1] - 1).max(0) >> level) + 1) << level;
             }
             for error in &mut block.errors {
-                *error = ErrorCode(error.0.checked_next_multiple_of(1 << 8).unwrap_or(u16::MAX));
+                *error = bound_of(upper_byte(*error));
             }
         }
     }
@@ -83,7 +77,7 @@ impl Index {
         write::varint(out, self.shared);
         write::varint(out, self.blocks.len() as u64);
         let space = shift(info.lattice.bits);
-        for (at, block) in (0..).zip(&self.blocks) {
+        for block in &self.blocks {
             block.lengths.iter().for_each(|&length| write::varint(out, u64::from(length)));
             let [low, high] = block.bounds;
             for (low, high) in low.into_iter().zip(high) {
@@ -91,27 +85,18 @@ impl Index {
                 write::varint(out, ((high - low) >> space) as u64);
             }
             for ((field, error), [low, high]) in info.fields.iter().zip(&block.errors).zip(&block.ranges) {
-                out.push(error.0.div_ceil(1 << 8).min(0xFF) as u8);
+                out.push(upper_byte(*error));
                 let level = shift(field.bits);
                 write::varint(out, (low >> level) as u64);
                 write::varint(out, ((high - low) >> level) as u64);
             }
-            // From the newest one back: most are near.
-            write::varint(out, block.parents.len() as u64);
-            let mut next: u32 = at;
-            for &parent in block.parents.iter().rev() {
-                write::varint(out, u64::from(next - 1 - parent));
-                next = parent;
-            }
+            write::varint(out, RESERVED);
         }
     }
 
     /// Reads the index of an MT.
-    pub fn read(mut reader: Reader<'_>, info: &MtInfo, parts: usize) -> Result<Self, FormatError> {
-        let block_bits = u32::from(reader.u8()?);
-        if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&block_bits) {
-            return Err(reader.corrupt("a block must hold 2^4 to 2^16 updates"));
-        }
+    pub fn read(mut reader: Reader<'_>, info: &MtInfo) -> Result<Self, FormatError> {
+        let block_bits = read_block_bits(&mut reader)?;
         let shared = reader.varint64()?;
         if shared > MAX_SHARED {
             return Err(reader.corrupt("what the blocks share is longer than sections can be"));
@@ -121,12 +106,21 @@ impl Index {
             return Err(reader.corrupt("the index does not have as many blocks as there are updates for"));
         }
         let mut index = Self { block_bits, shared, blocks: Vec::new() };
-        for at in 0..count {
-            index.blocks.push(read_block(&mut reader, info, parts, at)?);
+        for _ in 0..count {
+            index.blocks.push(read_block(&mut reader, info)?);
         }
         reader.end()?;
         Ok(index)
     }
+}
+
+/// Behind what is said of a block.
+const RESERVED: u64 = 0;
+
+/// The updates of a block of `2^block_bits` of an MT of so many.
+pub fn updates_of(block_bits: u32, block: u32, updates: u32) -> Range<u32> {
+    let (first, end) = (u64::from(block) << block_bits, u64::from(updates));
+    first.min(end) as u32..(first + (1 << block_bits)).min(end) as u32
 }
 
 /// What block sizes may be.
@@ -138,14 +132,18 @@ fn shift(bits: u32) -> u32 {
     bits.saturating_sub(8)
 }
 
-fn read_block(
-    reader: &mut Reader<'_>,
-    info: &MtInfo,
-    parts: usize,
-    at: u32,
-) -> Result<BlockInfo, FormatError> {
+/// log2 of the updates of a block.
+pub fn read_block_bits(reader: &mut Reader<'_>) -> Result<u32, FormatError> {
+    let bits = u32::from(reader.u8()?);
+    if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&bits) {
+        return Err(reader.corrupt("a block must hold 2^4 to 2^16 updates"));
+    }
+    Ok(bits)
+}
+
+fn read_block(reader: &mut Reader<'_>, info: &MtInfo) -> Result<BlockInfo, FormatError> {
     let mut block = BlockInfo::default();
-    for _ in 0..parts {
+    for _ in 0..=info.fields.len() {
         block.lengths.push(reader.varint()?);
     }
     let span = |reader: &mut Reader<'_>, bits: u32| -> Result<[i32; 2], FormatError> {
@@ -161,24 +159,12 @@ fn read_block(
         (block.bounds[0][axis], block.bounds[1][axis]) = (low, high);
     }
     for field in &info.fields {
-        let upper = reader.u8()?;
-        block.errors.push(ErrorCode(if upper == 0xFF { u16::MAX } else { u16::from(upper) << 8 }));
+        block.errors.push(bound_of(reader.u8()?));
         block.ranges.push(span(reader, field.bits)?);
     }
-    let count = reader.varint()?;
-    if info.kind == MtKind::HalfEdge && count > 0 {
-        return Err(reader.corrupt("a block of a half-edge MT names blocks that it depends on"));
+    if reader.varint64()? != RESERVED {
+        return Err(reader.corrupt("what is said of a block does not end with 0"));
     }
-    if count > at.min(MAX_PARENTS) {
-        return Err(reader.corrupt("a block depends on more blocks than come before it"));
-    }
-    let mut next = at;
-    for _ in 0..count {
-        let parent = next.checked_sub(1).and_then(|last| last.checked_sub(reader.varint().ok()?));
-        next = parent.ok_or_else(|| reader.corrupt("a block depends on one that does not come before it"))?;
-        block.parents.push(next);
-    }
-    block.parents.reverse();
     Ok(block)
 }
 
@@ -186,11 +172,11 @@ fn read_block(
 mod tests {
     use super::*;
     use crate::geom::Lattice;
-    use crate::mt::FieldInfo;
+    use crate::mt::{FieldInfo, MtKind};
 
-    fn info(kind: MtKind) -> MtInfo {
+    fn info() -> MtInfo {
         MtInfo {
-            kind,
+            kind: MtKind::HalfEdge,
             lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 10 },
             fields: vec![FieldInfo { bits: 12, ..FieldInfo::default() }],
             vertices: 0,
@@ -204,25 +190,24 @@ mod tests {
 
     /// The index of 40 updates in blocks of 16.
     fn index() -> Index {
-        let block = |parents: &[u32]| BlockInfo {
+        let block = BlockInfo {
             lengths: vec![100, 20],
             bounds: [[0, 4, 8], [1024, 8, 12]],
             errors: vec![ErrorCode(3 << 8)],
             ranges: vec![[16, 4096]],
-            parents: parents.to_vec(),
         };
-        Index { block_bits: 4, shared: 1 << 40, blocks: vec![block(&[]), block(&[0]), block(&[0, 1])] }
+        Index { block_bits: 4, shared: 1 << 40, blocks: vec![block; 3] }
     }
 
-    fn read(index: &Index, kind: MtKind) -> Result<Index, FormatError> {
+    fn read(index: &Index) -> Result<Index, FormatError> {
         let mut bytes = Vec::new();
-        index.write(&mut bytes, &info(kind));
-        Index::read(Reader::new(&bytes, 0), &info(kind), 2)
+        index.write(&mut bytes, &info());
+        Index::read(Reader::new(&bytes, 0), &info())
     }
 
     #[test]
     fn an_index_comes_back() {
-        assert_eq!(read(&index(), MtKind::Edge), Ok(index()));
+        assert_eq!(read(&index()), Ok(index()));
     }
 
     #[test]
@@ -240,28 +225,12 @@ mod tests {
         for (what, fault) in faults {
             let mut index = index();
             fault(&mut index);
-            assert!(matches!(read(&index, MtKind::Edge), Err(FormatError::Corrupt { .. })), "{what}");
+            assert!(matches!(read(&index), Err(FormatError::Corrupt { .. })), "{what}");
         }
-        assert!(
-            matches!(read(&index(), MtKind::HalfEdge), Err(FormatError::Corrupt { .. })),
-            "half-edge MTs have no parents"
-        );
-        // The last block depends on two: these numbers are at the end.
         let mut bytes = Vec::new();
-        index().write(&mut bytes, &info(MtKind::Edge));
-        assert!(bytes.ends_with(&[2, 0, 0]));
-        let parents: [(&str, &[u8]); 3] = [
-            ("more blocks to depend on than come before", &[3, 0, 0]),
-            ("one before the first", &[1, 2]),
-            ("one before the first, as the second", &[2, 0, 1]),
-        ];
-        for (what, parents) in parents {
-            let bytes = [&bytes[..bytes.len() - 3], parents].concat();
-            let read = Index::read(Reader::new(&bytes, 0), &info(MtKind::Edge), 2);
-            assert!(matches!(read, Err(FormatError::Corrupt { .. })), "{what}");
-        }
-        let mut free = index();
-        free.blocks.iter_mut().for_each(|block| block.parents.clear());
-        assert_eq!(read(&free, MtKind::HalfEdge), Ok(free));
+        index().write(&mut bytes, &info());
+        *bytes.last_mut().expect("some bytes") = 1;
+        let read = Index::read(Reader::new(&bytes, 0), &info());
+        assert!(matches!(read, Err(FormatError::Corrupt { .. })), "another reserved number");
     }
 }

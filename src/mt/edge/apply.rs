@@ -18,10 +18,9 @@ use crate::mesh::NONE;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{GATHERED, Gather};
 use crate::mt::mesh::tet::{TURN, corner_of};
-use crate::mt::pages::Page;
 use crate::mt::{
     Applied, ApplyUpdates, CurrentMesh, EdgeMt, EdgeUpdate, ErrorCode, LookAtTet, MAX_LINK,
-    MultiTessellation, PageError, UpdateError, UpdateId, UpdatePages, VertexId,
+    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use std::ops::Range;
 
@@ -369,14 +368,12 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
 }
 
 impl UpdatePages for EdgeMt {
-    in_pages!();
-
-    fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
-        self.take_page(page)
+    fn page_bits(&self) -> u32 {
+        self.page_bits()
     }
 
-    fn update_bytes(&self) -> u64 {
-        self.record.bytes()
+    fn set_to_come(&mut self, bounds: &[ErrorCode]) {
+        self.note_to_come(bounds);
     }
 
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
@@ -385,18 +382,6 @@ impl UpdatePages for EdgeMt {
                 mesh.labels[slot as usize].kind_word = KindWord(u.0);
                 mesh.touch_star(slot);
             }
-        }
-    }
-
-    fn page_evicted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
-        for u in updates.clone().map(UpdateId).filter(|u| self.has(*u)) {
-            if let Some(slot) = mesh.slot(self.split_vertex(u)) {
-                mesh.labels[slot as usize].kind_word = KindWord::NONE;
-            }
-        }
-        if !updates.is_empty() {
-            let [first, end] = [updates.start, updates.end].map(|u| self.created(UpdateId(u))[0].0);
-            mesh.forget_vertices(first..end);
         }
     }
 }

@@ -16,10 +16,9 @@
 //! `mt/edge/predict.rs`. [`EdgeMtBuilder`](crate::mt::EdgeMtBuilder) makes them from plain vertex splits.
 
 use crate::mesh::NONE;
-use crate::mt::pages::{Page, Pages};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
-    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId, VertexId,
+    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use std::borrow::Cow;
 
@@ -70,30 +69,28 @@ pub struct EdgeUpdate<'a> {
 /// A compact edge-based MT. With one field of 16 bits an update, and so a reference vertex, takes 32 bytes, on lattices of more
 /// than 21 bits 36, and 2 for the error; the base mesh, which is small, comes on top.
 ///
-/// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT. Or else it comes and goes in pages of
-/// updates, by [`insert_page`](EdgeMt::insert_page) and [`remove_page`](crate::mt::UpdatePages::remove_page): every set of pages that holds
-/// with each page all those on which it depends is an MT, too.
+/// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EdgeMt {
     pub(in crate::mt) info: MtInfo,
     base: BaseMesh,
     /// `s(v)` for the vertices of the base mesh, [`WHOLE`] while nothing splits them.
     base_splits: Vec<i32>,
-    pub(super) pages: Pages<EdgePage>,
-    pub(super) record: Record,
-}
-
-/// Updates that come and go together, each with all that belongs to it side by side.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct EdgePage {
+    /// The updates, each as a [`Record`] says, one after the other.
     words: Vec<i32>,
     errors: Errors,
+    updates: u32,
+    record: Record,
+    /// By field; empty as long as nothing is known, and when all updates are here.
+    to_come: Vec<ErrorCode>,
+    /// See [`UpdatePages::page_bits`].
+    page_bits: u32,
 }
 
 /// What the words of an update are: the vertex that it splits, `s(v')`, `s(v'')`, two for the mask, and as many as hold, bit by bit,
 /// the components of the offset, the edge that it is counted from, and the offset in each field.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Record {
+struct Record {
     /// Bits of a component of an offset.
     component: u32,
     /// Bits of the offset in each field.
@@ -122,7 +119,8 @@ impl Record {
     }
 
     /// Bytes of an update, its errors included.
-    pub fn bytes(&self) -> u64 {
+    #[cfg(test)]
+    fn bytes(&self) -> u64 {
         let errors = if self.levels.len() == 1 { 1 } else { self.levels.len() + 1 };
         (self.len * size_of::<i32>() + errors * size_of::<ErrorCode>()) as u64
     }
@@ -184,56 +182,44 @@ fn two(words: &[i32], at: usize) -> u64 {
     u64::from(words[at] as u32) | u64::from(words[at + 1] as u32) << 32
 }
 
-impl EdgePage {
-    /// Adds the next update, which has been checked.
-    fn push(&mut self, record: &Record, update: &EdgeUpdate<'_>) {
-        let complete = self.errors.push(update.errors);
-        assert!(complete, "each field has an error: that is checked");
-        record.push(&mut self.words, update);
-    }
-}
-
-impl Page for EdgePage {
-    fn errors(&self) -> &Errors {
-        &self.errors
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.words[..]) + self.errors.bytes()
-    }
-}
-
 impl EdgeMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`](crate::mt::BaseMesh::check).
-    pub fn new(info: MtInfo, base: BaseMesh) -> Self {
-        Self::with_page_bits(info, base, MtKind::Edge.usual_block_bits())
-    }
-
-    /// [`EdgeMt::new`] with pages of `2^bits` updates, of `2^16` at most.
-    pub fn with_page_bits(mut info: MtInfo, base: BaseMesh, bits: u32) -> Self {
+    pub fn new(mut info: MtInfo, base: BaseMesh) -> Self {
         info.kind = MtKind::Edge;
         Self {
             base_splits: vec![WHOLE; base.positions.len()],
             base,
-            pages: Pages::new(info.updates, bits),
+            words: Vec::new(),
+            errors: Errors::new(info.fields.len()),
+            updates: 0,
             record: Record::new(&info),
+            to_come: Vec::new(),
+            page_bits: MtKind::Edge.usual_block_bits(),
             info,
         }
     }
 
-    /// The MT, complete, in pages of another size.
-    ///
-    /// # Errors
-    /// If an update is not here.
-    pub fn in_pages(&self, page_bits: u32) -> Result<Self, UpdateError> {
-        let mut mt = Self::with_page_bits(self.info.clone(), self.base.clone(), page_bits);
-        for update in 0..self.updates() {
-            if !self.pages.has(UpdateId(update)) {
-                return Err(UpdateError::Missing { update });
-            }
-            mt.push(&self.update(UpdateId(update)))?;
+    /// Notes how many updates a block of its file has: see [`UpdatePages::page_bits`].
+    #[doc(hidden)]
+    pub fn set_page_bits(&mut self, bits: u32) {
+        self.page_bits = bits;
+    }
+
+    pub(super) fn page_bits(&self) -> u32 {
+        self.page_bits
+    }
+
+    /// See [`UpdatePages::set_to_come`].
+    pub(super) fn note_to_come(&mut self, bounds: &[ErrorCode]) {
+        self.to_come.clear();
+        if self.updates() < self.info.updates {
+            self.to_come.extend_from_slice(bounds);
         }
-        Ok(mt)
+    }
+
+    /// A bound of the errors of the updates that are not here yet, where one is known.
+    fn unless_complete(&self, bound: Option<ErrorCode>) -> ErrorCode {
+        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { bound.unwrap_or(ErrorCode::MAX) }
     }
 
     /// Adds the next update, behind all that are here.
@@ -250,8 +236,10 @@ impl EdgeMt {
             Some(word) if *word == WHOLE => *word = update as i32,
             _ => return Err(UpdateError::Vertex { update, vertex }),
         }
-        let (record, fields) = (&self.record, self.info.fields.len());
-        self.pages.push(|updates| new_page(record, fields, updates.len()), |page| page.push(record, new));
+        let complete = self.errors.push(new.errors);
+        assert!(complete, "each field has an error: that is checked");
+        self.record.push(&mut self.words, new);
+        self.updates += 1;
         Ok(UpdateId(update))
     }
 
@@ -275,76 +263,11 @@ impl EdgeMt {
         }
     }
 
-    /// Adds all updates of a page, of any that is not here. The pages on which it depends must be here; those that follow
-    /// from the vertices that it splits are looked for, others are the caller's to know.
-    ///
-    /// # Errors
-    /// If the page is not a whole one of this MT, is here already, depends on a page that is not, or has an update that
-    /// [`EdgeMt::push`] would refuse. The MT is as it was then.
-    pub fn insert_page(&mut self, page: u32, splits: &[EdgeUpdate<'_>]) -> Result<(), PageError> {
-        let updates = self.pages.check_new(page, splits.len())?;
-        let mut new = new_page(&self.record, self.info.fields.len(), updates.len());
-        for (update, split) in updates.clone().zip(splits) {
-            self.check(update, split)?;
-            self.check_vertex(page, update, split.vertex)?;
-            new.push(&self.record, split);
-        }
-        self.pages.insert(page, new);
-        for (k, (update, split)) in updates.zip(splits).enumerate() {
-            match self.split_word(split.vertex) {
-                Some(word) if *word == WHOLE => *word = update as i32,
-                _ => {
-                    splits[..k].iter().for_each(|noted| self.unsplit(noted.vertex));
-                    self.pages.remove(page);
-                    return Err(UpdateError::Vertex { update, vertex: split.vertex.0 }.into());
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether the vertex that an update of a new page splits is, or is going to be, there before it.
-    fn check_vertex(&self, page: u32, update: u32, vertex: VertexId) -> Result<(), PageError> {
-        let Some(creator) = self.created_by(vertex) else { return Ok(()) };
-        let other = self.pages.page_of(creator.0);
-        if creator.0 >= update {
-            return Err(UpdateError::Vertex { update, vertex: vertex.0 }.into());
-        }
-        if other == page || self.pages.has(creator) { Ok(()) } else { Err(PageError::Needs { page, other }) }
-    }
-
-    /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
-    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction). What depends on the page must have gone before.
-    ///
-    /// # Errors
-    /// If the page is not here, or another one that is splits a vertex of it. The MT is as it was then.
-    pub(super) fn take_page(&mut self, page: u32) -> Result<(), PageError> {
-        let leaving = self.pages.get(page).ok_or(PageError::Absent { page })?;
-        let splits = leaving.words.chunks(self.record.len).flat_map(|words| &words[SPLITS..MASK]);
-        let mut others =
-            splits.filter(|split| **split != WHOLE).map(|split| self.pages.page_of(*split as u32));
-        if let Some(other) = others.find(|other| *other != page) {
-            return Err(PageError::Needed { page, other });
-        }
-        let vertices = leaving.words.chunks(self.record.len).map(|words| VertexId(words[VERTEX] as u32));
-        let vertices: Vec<VertexId> = vertices.collect();
-        vertices.into_iter().for_each(|v| self.unsplit(v));
-        self.pages.remove(page);
-        Ok(())
-    }
-
-    fn unsplit(&mut self, vertex: VertexId) {
-        if let Some(word) = self.split_word(vertex) {
-            *word = WHOLE;
-        }
-    }
-
     /// The words of an update; none if it is not here.
     #[inline]
     fn words(&self, u: UpdateId) -> &[i32] {
         let len = self.record.len;
-        let words = self.pages.find(u.0).and_then(|(page, at)| page.words.get(at * len..(at + 1) * len));
-        words.unwrap_or_default()
+        if self.has(u) { &self.words[u.0 as usize * len..][..len] } else { &[] }
     }
 
     /// Where it is noted what splits a vertex; none if what creates it is not here.
@@ -352,8 +275,9 @@ impl EdgeMt {
         let Some(i) = v.0.checked_sub(self.base_splits.len() as u32) else {
             return self.base_splits.get_mut(v.0 as usize);
         };
-        let (page, place) = self.pages.find_mut(i / 2)?;
-        page.words.get_mut(place * self.record.len + SPLITS + i as usize % 2)
+        let is_here = self.has(UpdateId(i / 2));
+        let at = i as usize / 2 * self.record.len + SPLITS + i as usize % 2;
+        if is_here { self.words.get_mut(at) } else { None }
     }
 
     /// Update `u` as it is stored.
@@ -422,15 +346,36 @@ impl EdgeMt {
     }
 }
 
-fn new_page(record: &Record, fields: usize, updates: usize) -> EdgePage {
-    EdgePage {
-        words: Vec::with_capacity(updates * record.len),
-        errors: Errors::with_capacity(fields, updates),
-    }
-}
-
 impl MultiTessellation for EdgeMt {
-    reads_pages!();
+    fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    fn updates(&self) -> u32 {
+        self.updates
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        if self.has(u) { self.errors.largest(u.0 as usize) } else { ErrorCode::ZERO }
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        if self.has(u) { self.errors.of(u.0 as usize) } else { &[] }
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        self.unless_complete(self.to_come.iter().copied().max())
+    }
+
+    fn to_come_in(&self, field: usize) -> ErrorCode {
+        self.unless_complete(self.to_come.get(field).copied())
+    }
 
     /// A split adds the tetrahedra of its fan.
     fn always_grows(&self) -> bool {
@@ -438,7 +383,8 @@ impl MultiTessellation for EdgeMt {
     }
 
     fn bytes(&self) -> u64 {
-        self.base.bytes() + size_of_val(&self.base_splits[..]) as u64 + self.pages.all_bytes()
+        let updates = size_of_val(&self.words[..]) + self.errors.bytes();
+        self.base.bytes() + (size_of_val(&self.base_splits[..]) + updates) as u64
     }
 }
 

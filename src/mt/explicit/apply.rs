@@ -190,7 +190,7 @@ fn perform(
 
 impl UpdatePages for ExplicitMt {
     fn page_bits(&self) -> u32 {
-        self.page_bits
+        self.info().kind.usual_block_bits()
     }
 
     fn set_to_come(&mut self, bounds: &[ErrorCode]) {

@@ -61,8 +61,6 @@ pub struct ExplicitMt {
     pub(super) to_come: ErrorCode,
     /// Whether every update so far inserts more tetrahedra than it removes.
     pub(in crate::mt) always_grows: bool,
-    /// See [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
-    pub(super) page_bits: u32,
 }
 
 /// What an explicit MT consists of, in numbers.
@@ -112,13 +110,7 @@ impl ExplicitMt {
             to_come: ErrorCode::MAX,
             always_grows: true,
             base,
-            page_bits: MtKind::Explicit.usual_block_bits(),
         }
-    }
-
-    /// Notes how many updates a block of its file has: see [`UpdatePages::page_bits`](crate::mt::UpdatePages::page_bits).
-    pub(crate) fn set_page_bits(&mut self, bits: u32) {
-        self.page_bits = bits;
     }
 
     /// Adds the next update.
@@ -199,17 +191,6 @@ impl ExplicitMt {
         }
         (self.quarterings, self.own_falls) = (Some(quarterings), falls);
         Ok(())
-    }
-
-    /// Sets the fall of update `u`, where tetrahedra have errors of their own.
-    pub(crate) fn set_own_fall(&mut self, u: UpdateId, fall: u8) {
-        self.own_falls.get_mut(u.0 as usize).into_iter().for_each(|own| *own = fall);
-    }
-
-    /// Sets the quarterings of tetrahedron `t`, where there are any.
-    pub(crate) fn set_quarterings_of(&mut self, t: u32, quarterings: u8) {
-        let own = self.quarterings.as_mut().and_then(|all| all.get_mut(t as usize));
-        own.into_iter().for_each(|own| *own = quarterings);
     }
 
     /// The quarterings of all tetrahedra; none if they have no errors of their own.

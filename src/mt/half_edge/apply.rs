@@ -438,7 +438,35 @@ impl CurrentMesh {
 }
 
 impl UpdatePages for HalfEdgeMt {
-    in_pages!();
+    #[inline]
+    fn has(&self, u: UpdateId) -> bool {
+        self.pages.has(u)
+    }
+
+    fn present(&self) -> u32 {
+        self.pages.present()
+    }
+
+    fn set_to_come(&mut self, bounds: &[ErrorCode]) {
+        self.pages.set_to_come(bounds);
+    }
+
+    fn page_bits(&self) -> u32 {
+        self.pages.bits()
+    }
+
+    fn has_page(&self, page: u32) -> bool {
+        self.pages.get(page).is_some()
+    }
+
+    fn page_bytes(&self) -> u64 {
+        self.pages.bytes()
+    }
+
+    fn bytes_of_page(&self, page: u32) -> u64 {
+        let likely = || self.pages.updates_of(page).len() as u64 * self.update_bytes();
+        self.pages.get(page).map_or_else(likely, |page| page.bytes() as u64)
+    }
 
     fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
         self.take_page(page)
@@ -446,10 +474,6 @@ impl UpdatePages for HalfEdgeMt {
 
     fn update_bytes(&self) -> u64 {
         40 + 6 * self.info().fields.len() as u64
-    }
-
-    fn needs_parents(&self) -> bool {
-        false
     }
 
     #[inline]

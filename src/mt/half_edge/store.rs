@@ -360,7 +360,35 @@ impl HalfEdgeMt {
 }
 
 impl MultiTessellation for HalfEdgeMt {
-    reads_pages!();
+    fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    fn updates(&self) -> u32 {
+        self.pages.updates()
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.pages.error(u)
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.pages.errors(u)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        self.pages.to_come()
+    }
+
+    fn to_come_in(&self, field: usize) -> ErrorCode {
+        self.pages.to_come_in(field)
+    }
 
     /// Each fills at least one gap.
     fn always_grows(&self) -> bool {

@@ -79,7 +79,7 @@ pub const VALUE_BITS: Row = symbols(383, 2, 65);
 pub const QUARTERS: Row = symbols(385, 8, 4);
 pub const OWN_FALL: Row = symbols(393, 1, 256);
 
-/// In the place of those from `GAP` to `LEVEL`, in files of kind 1 and 2.
+/// In the place of those from `GAP` to `LEVEL`, in files of kind 1.
 pub const FALL: Row = numbers(29, 1, 2);
 pub const FAN: Row = symbols(30, 1, 2);
 pub const DISTANCE: Row = symbols(31, 4, 112);
@@ -89,12 +89,6 @@ pub const GIVEN_UP: Row = symbols(144, 1, 2);
 pub const FAR: Row = symbols(145, 20, 2);
 pub const SHORT: Row = numbers(165, 1, 0);
 pub const INSERTION_LEVEL: Row = numbers(166, 40, 1);
-pub const SPELLED_FALL: Row = numbers(206, 1, 2);
-pub const COUNT: Row = numbers(207, 3, 3);
-pub const DIFFERENCE: Row = numbers(210, 3, 1);
-pub const LEVEL_DIFFERENCE: Row = numbers(213, 1, 1);
-pub const REMOVED: Row = numbers(214, 2, 2);
-pub const CORNER: Row = numbers(216, 4, 4);
 
 /// In their place in files of kind 3.
 pub const REMOVER: Row = numbers(29, 1, 1);
@@ -114,23 +108,8 @@ pub const HALF_EDGE_LEVEL: Row = numbers(247, 128, 1);
 const OF_ALL: [Row; 10] =
     [BEHIND, SEED, LENGTH, STEP, RANK, BASE_LEVEL, VALUE_GAP, VALUE_BITS, QUARTERS, OWN_FALL];
 const OF_SPLITS: [Row; 10] = [GAP, RUN, CHILDREN, RISE, EDGE, OFFSET, LAST_WRONG, WRONG, ERROR, LEVEL];
-const OF_OTHERS: [Row; 15] = [
-    FALL,
-    FAN,
-    DISTANCE,
-    SEED_PLACE,
-    GROW,
-    GIVEN_UP,
-    FAR,
-    SHORT,
-    INSERTION_LEVEL,
-    SPELLED_FALL,
-    COUNT,
-    DIFFERENCE,
-    LEVEL_DIFFERENCE,
-    REMOVED,
-    CORNER,
-];
+const OF_INSERTIONS: [Row; 9] =
+    [FALL, FAN, DISTANCE, SEED_PLACE, GROW, GIVEN_UP, FAR, SHORT, INSERTION_LEVEL];
 
 const OF_HALF_EDGES: [Row; 13] = [
     REMOVER,
@@ -158,8 +137,8 @@ pub fn tables(mut bytes: Bytes<'_>, kind: u8) -> Vec<Table> {
     let mut bits = Bits::new(bytes.0);
     let of_kind = match kind {
         0 => OF_SPLITS.iter(),
-        3 => OF_HALF_EDGES.iter(),
-        _ => OF_OTHERS.iter(),
+        1 => OF_INSERTIONS.iter(),
+        _ => OF_HALF_EDGES.iter(),
     };
     let rows = OF_ALL.iter().chain(of_kind);
     let tables = (0..count).map(|context| {

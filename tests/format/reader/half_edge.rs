@@ -71,8 +71,8 @@ pub fn forest(coded: &mut Coded<'_>, info: &Info, block_bits: u32, base: &Growth
 
 /// Reads a block, given nothing of any other.
 pub fn block(file: &File, block: u32, parts: &[Bytes<'_>]) -> Vec<Record> {
-    let updates: Range<u32> = file.index.updates(block, &file.info);
-    let mut names = Names::new(&file.info, file.index.block_bits, block);
+    let updates: Range<u32> = file.updates(block);
+    let mut names = Names::new(&file.info, file.block_bits, block);
     let mut coded = Coded::new(parts[0], &file.tables);
     let records = updates.clone().map(|update| {
         let children = names.children(&mut coded, Some(update));

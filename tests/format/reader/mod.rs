@@ -11,7 +11,6 @@ pub mod half_edge_mesh;
 mod histogram;
 pub mod insertions;
 pub mod plain;
-pub mod spelled;
 pub mod splits;
 pub mod wire;
 
@@ -21,7 +20,6 @@ use exact::Exact;
 use growth::Growth;
 use half_edge::Forest;
 use insertions::Start;
-use spelled::Spelled;
 use splits::Split;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -32,7 +30,10 @@ pub struct File {
     pub info: Info,
     /// Flag 0: updates tell errors of the tetrahedra that they remove.
     pub tet_errors: bool,
-    pub index: Index,
+    /// In files of kind 3.
+    pub index: Option<Index>,
+    /// log2 of the updates of a block.
+    pub block_bits: u32,
     /// By field; empty if there are none.
     pub histograms: Vec<Vec<u32>>,
     /// The box around the reference mesh, if it is stated.
@@ -46,6 +47,8 @@ pub struct File {
     /// By field, then by vertex.
     pub base_levels: Vec<Vec<i32>>,
     pub splits: HashMap<u32, Split>,
+    /// In files of kind 0, for each block, by field, what no error of an update behind it is larger than.
+    pub behind: Vec<Vec<u16>>,
     pub exact: Vec<Exact>,
     /// Where each block is in the file.
     pub blocks: Vec<Range<usize>>,
@@ -65,25 +68,25 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         section
     };
     let info = wire::info(next(b"INFO").payload);
-    assert!(info.kind != 3 || file[8] == 3, "a kind of version 3");
-    let section = next(b"INDX");
-    let (index, index_end) = (wire::index(section.payload, &info), section.range[1]);
+    let section = (info.kind == 3).then(|| next(b"INDX"));
+    let index = section.map(|section| wire::index(section.payload, &info));
     let histograms = histogram::find(front, &info);
-    assert!(histograms.is_empty() || file[10] > 0, "what minor version 1 adds");
     let place = |kind: &[u8; 4]| front.iter().position(|section| &section.kind == kind);
     let bounds = place(b"bbox").map(|at| {
-        assert!(file[10] > 1, "what minor version 2 adds");
-        assert!(place(b"hist").max(place(b"INDX")) < Some(at) && Some(at) < place(b"MODL"));
+        let before = [b"INFO", b"INDX", b"hist"].map(place).into_iter().max().expect("three places");
+        assert!(before < Some(at) && Some(at) < place(b"MODL"));
         wire::bounds(front[at].payload, &info)
     });
     let tables = coded::tables(next(b"MODL").payload, info.kind);
     let mut payload = next(b"BASE").payload;
     let [vertices, tets] = [payload.varint(), payload.varint()];
-    assert!(info.kind == 2 || vertices + info.updates == info.vertices);
+    assert_eq!(vertices + info.updates, info.vertices);
+    let block_bits = index.as_ref().map_or_else(|| u32::from(payload.u8()), |index| index.block_bits);
+    assert!((4..=16).contains(&block_bits));
     let mut coded = Coded::new(payload, &tables);
     let base = growth::read(&mut coded, vertices as usize, tets as usize);
     let start = (info.kind == 1).then(|| insertions::start(&mut coded));
-    let forest = (info.kind == 3).then(|| half_edge::forest(&mut coded, &info, index.block_bits, &base));
+    let forest = (info.kind == 3).then(|| half_edge::forest(&mut coded, &info, block_bits, &base));
     coded.end();
     let mut base_levels = Vec::new();
     for field in 0..info.fields.len() {
@@ -99,21 +102,36 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         coded.end();
     }
     let mut parts_of = Parts::new();
-    let (mut at, mut blocks) = (index_end + index.between, Vec::new());
-    let kind = [b"UPDT", b"INSV", b"EXPL", b"HALF"][usize::from(info.kind)];
-    for (block, entry) in (0..).zip(&index.blocks) {
-        let (start, mut parts) = (at as usize, Vec::new());
-        for (part, length) in (0..).zip(&entry.lengths) {
+    let mut blocks: Vec<Range<usize>> = Vec::new();
+    let kind = match info.kind {
+        0 => b"UPDT",
+        1 => b"INSV",
+        _ => b"HALF",
+    };
+    let count = if info.kind == 3 { 1 + info.fields.len() as u32 } else { 1 };
+    for block in 0..info.updates.div_ceil(1 << block_bits) {
+        let (mut parts, mut lengths) = (Vec::new(), Vec::new());
+        for part in 0..count {
             let section = next(if part == 0 { kind } else { b"FLDU" });
-            assert_eq!(section.range, [at, at + u64::from(*length)]);
-            at = section.range[1];
+            let [start, end] = section.range;
+            match blocks.get_mut(block as usize) {
+                None => blocks.push(start as usize..end as usize),
+                Some(range) => {
+                    assert_eq!(range.end, start as usize);
+                    range.end = end as usize;
+                }
+            }
+            lengths.push((end - start) as u32);
             let mut payload = section.payload;
             assert_eq!(payload.varint(), block);
             assert!(part == 0 || payload.varint() == part - 1);
             parts.push(payload);
         }
+        assert!(index.as_ref().is_none_or(|index| index.blocks[block as usize].lengths == lengths));
         parts_of.push(parts);
-        blocks.push(start..at as usize);
+    }
+    if let (Some(index), Some(section), Some(first)) = (&index, section, blocks.first()) {
+        assert_eq!(section.range[1] + index.between, first.start as u64);
     }
     assert!(known.next().is_none());
     let values = front.iter().filter(|section| &section.kind == b"fldx");
@@ -122,12 +140,13 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     check_end(end, front, &info);
     let splits = HashMap::new();
     let tet_errors = file[12] & 1 == 1;
-    assert!(!tet_errors || [1, 2].contains(&info.kind));
+    assert!(!tet_errors || info.kind == 1);
     (
         File {
             info,
             tet_errors,
             index,
+            block_bits,
             histograms,
             bounds,
             tables,
@@ -136,6 +155,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
             forest,
             base_levels,
             splits,
+            behind: Vec::new(),
             exact,
             blocks,
         },
@@ -143,60 +163,45 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     )
 }
 
-/// Reads a whole file of kind 0. Blocks are read in an order that `choose` makes of those that can be read next, given only
-/// the blocks on which they depend.
-pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
+/// Reads a whole file of kind 0.
+pub fn read(file: &[u8]) -> File {
     let (mut file, parts_of) = open(file);
     assert_eq!(file.info.kind, 0, "a file of another kind");
-    let mut left: BTreeSet<u32> = (0..parts_of.len() as u32).collect();
-    let mut closures: HashMap<u32, BTreeSet<u32>> = HashMap::new();
-    while !left.is_empty() {
-        let is_ready =
-            |block: &u32| file.index.blocks[*block as usize].parents.iter().all(|p| !left.contains(p));
-        let ready: Vec<u32> = left.iter().copied().filter(is_ready).collect();
-        let block = choose(&ready);
-        assert!(left.remove(&block));
-        let mut closure = BTreeSet::new();
-        for parent in &file.index.blocks[block as usize].parents {
-            closure.insert(*parent);
-            closure.extend(&closures[parent]);
-        }
-        file.read_block(block, &parts_of[block as usize], &closure);
-        closures.insert(block, closure);
-    }
+    (0..).zip(parts_of).for_each(|(block, parts)| file.read_block(block, parts[0]));
     file
 }
 
-/// Reads the blocks of a file of kind 1, 2 or 3: the updates in order.
+/// Reads the blocks of a file of kind 1 or 3: the updates in order.
 pub fn changes(file: &File, parts: &Parts<'_>) -> Vec<Change> {
     let mut changes = Vec::new();
     if file.info.kind == 3 {
         let mut mesh = half_edge_mesh::Mesh::new(file);
         for block in 0..parts.len() as u32 {
             mesh.add_block(half_edge::block(file, block, &parts[block as usize]));
-            changes.extend(file.index.updates(block, &file.info).map(|k| mesh.apply(k)));
+            changes.extend(file.updates(block).map(|k| mesh.apply(k)));
         }
         return changes;
     }
-    let mut each = |read: &mut dyn FnMut(&mut Coded<'_>, usize) -> Vec<Change>| {
-        for (block, parts) in (0..).zip(parts) {
-            let mut coded = Coded::new(parts[0], &file.tables);
-            changes.extend(read(&mut coded, file.index.updates(block, &file.info).len()));
-            coded.end();
+    assert_eq!(file.info.kind, 1);
+    let (mut mesh, mut behind) = (insertions::Mesh::new(file), Vec::new());
+    for (block, parts) in (0..).zip(parts) {
+        let mut coded = Coded::new(parts[0], &file.tables);
+        behind.push(bounds(&mut coded, file.info.fields.len()));
+        changes.extend(file.updates(block).map(|_| mesh.update(&mut coded)));
+        coded.end();
+    }
+    for (block, bounds) in (0..).zip(behind) {
+        for change in &changes[file.updates(block).end as usize..] {
+            assert!(change.errors.iter().zip(&bounds).all(|(error, bound)| error <= bound));
         }
-    };
-    match file.info.kind {
-        1 => {
-            let mut mesh = insertions::Mesh::new(file);
-            each(&mut |coded, updates| (0..updates).map(|_| mesh.update(coded)).collect());
-        }
-        2 => {
-            let mut spelled = Spelled::new(file);
-            each(&mut |coded, updates| spelled.block(coded, updates));
-        }
-        kind => panic!("a file of kind {kind}"),
     }
     changes
+}
+
+/// By field, what no error of an update behind a block is larger than.
+fn bounds(coded: &mut Coded<'_>, fields: usize) -> Vec<u16> {
+    let bound = |upper| if upper == 255 { u16::MAX } else { 256 * upper as u16 };
+    (0..fields).map(|_| bound(coded.bits(8))).collect()
 }
 
 fn check_end(end: &Section<'_>, front: &[Section<'_>], info: &Info) {
@@ -212,7 +217,7 @@ fn check_end(end: &Section<'_>, front: &[Section<'_>], info: &Info) {
 impl File {
     /// The block of an update.
     pub fn block_of(&self, k: u32) -> u32 {
-        k >> self.index.block_bits
+        k >> self.block_bits
     }
 
     /// Contexts and symbols that occur in them.
@@ -223,27 +228,28 @@ impl File {
         (0..).zip(&self.tables).flat_map(of_context).collect()
     }
 
-    /// Decodes a block knowing no more than what the index says it depends on.
-    fn read_block(&mut self, block: u32, parts: &[Bytes<'_>], closure: &BTreeSet<u32>) {
-        let updates = self.index.updates(block, &self.info);
-        let is_known = |k: &u32| closure.contains(&(k >> self.index.block_bits));
-        let known = self.splits.iter().filter(|(k, _)| is_known(k)).map(|(&k, split)| (k, split.clone()));
-        let known = known.collect();
-        let mut coded = Coded::new(parts[0], &self.tables);
+    /// The updates of a block.
+    pub fn updates(&self, block: u32) -> Range<u32> {
+        let size = 1_u32 << self.block_bits;
+        block * size..self.info.updates.min((block + 1) * size)
+    }
+
+    /// Decodes the next block of a file of kind 0.
+    fn read_block(&mut self, block: u32, payload: Bytes<'_>) {
+        let updates = self.updates(block);
+        let mut coded = Coded::new(payload, &self.tables);
+        let fields = self.info.fields.len();
+        self.behind.push(bounds(&mut coded, fields));
         let mut splits =
-            splits::shared(&mut coded, self.base.positions.len() as u32, updates.clone(), &known);
-        coded.end();
-        let rows = [ERROR, LEVEL];
-        for part in &parts[1..] {
-            let mut coded = Coded::new(*part, &self.tables);
-            for (split, (error, residual)) in
-                splits.iter_mut().zip(splits::field(&mut coded, updates.len(), rows))
-            {
+            splits::shared(&mut coded, self.base.positions.len() as u32, updates.clone(), &self.splits);
+        for _ in 0..fields {
+            let changes = splits::field(&mut coded, updates.len(), [ERROR, LEVEL]);
+            for (split, (error, residual)) in splits.iter_mut().zip(changes) {
                 split.errors.push(error);
                 split.residuals.push(residual);
             }
-            coded.end();
         }
+        coded.end();
         self.splits.extend(updates.zip(splits));
     }
 }

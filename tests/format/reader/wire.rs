@@ -90,8 +90,8 @@ pub struct Section<'a> {
 pub fn sections(file: &[u8]) -> Vec<Section<'_>> {
     let mut header = Bytes(&file[..32]);
     assert_eq!(header.take(8), [0x89, 0x54, 0x4C, 0x4F, 0x44, 0x0D, 0x0A, 0x1A]);
-    assert!([2, 3].contains(&header.u16()), "the major version");
-    let _minor = header.u16();
+    assert_eq!(header.u16(), 1, "the version");
+    let _reserved = header.u16();
     assert!(header.u32() & 0xFFFF <= 1, "critical flags");
     let total = header.u64();
     assert!(total == 0 || total == file.len() as u64);
@@ -157,7 +157,7 @@ pub fn info(mut bytes: Bytes<'_>) -> Info {
         metadata: Vec::new(),
         rounding: 0.0,
     };
-    assert!(info.kind <= 3 && info.updates <= 1 << 30 && (1..=30).contains(&info.bits));
+    assert!([0, 1, 3].contains(&info.kind) && info.updates <= 1 << 30 && (1..=30).contains(&info.bits));
     for _ in 0..bytes.u8() {
         let field = Field {
             name: bytes.string(),
@@ -224,8 +224,6 @@ pub struct BlockEntry {
     pub bounds: [[u64; 2]; 3],
     /// By field the largest code, and the least and largest level.
     pub fields: Vec<(u16, [u64; 2])>,
-    /// Ascending.
-    pub parents: Vec<u32>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -235,28 +233,19 @@ pub struct Index {
     pub blocks: Vec<BlockEntry>,
 }
 
-impl Index {
-    /// The numbers of the updates of a block.
-    pub fn updates(&self, block: u32, info: &Info) -> std::ops::Range<u32> {
-        let size = 1_u32 << self.block_bits;
-        block * size..info.updates.min((block + 1) * size)
-    }
-}
-
 pub fn index(mut bytes: Bytes<'_>, info: &Info) -> Index {
     let block_bits = u32::from(bytes.u8());
     assert!((4..=16).contains(&block_bits));
     let between = bytes.varint64();
     let count = bytes.varint();
     assert_eq!(count, info.updates.div_ceil(1 << block_bits));
-    let blocks = (0..count).map(|block| block_entry(&mut bytes, info, block)).collect();
+    let blocks = (0..count).map(|_| block_entry(&mut bytes, info)).collect();
     bytes.end();
     Index { block_bits, between, blocks }
 }
 
-fn block_entry(bytes: &mut Bytes<'_>, info: &Info, block: u32) -> BlockEntry {
-    let parts = if [0, 3].contains(&info.kind) { 1 + info.fields.len() } else { 1 };
-    let lengths = (0..parts).map(|_| bytes.varint()).collect();
+fn block_entry(bytes: &mut Bytes<'_>, info: &Info) -> BlockEntry {
+    let lengths = (0..=info.fields.len()).map(|_| bytes.varint()).collect();
     let span = |bytes: &mut Bytes<'_>, bits: u32| {
         let (low, more) = (u64::from(bytes.varint()), u64::from(bytes.varint()));
         assert!(low + more <= 1 << bits.min(8));
@@ -269,12 +258,6 @@ fn block_entry(bytes: &mut Bytes<'_>, info: &Info, block: u32) -> BlockEntry {
         (code, span(bytes, field.bits))
     });
     let fields = fields.collect();
-    let (mut parents, mut before) = (Vec::new(), block);
-    for _ in 0..bytes.varint() {
-        before = before - 1 - bytes.varint();
-        parents.push(before);
-    }
-    assert!(info.kind != 3 || parents.is_empty());
-    parents.reverse();
-    BlockEntry { lengths, bounds, fields, parents }
+    assert_eq!(bytes.varint(), 0, "reserved");
+    BlockEntry { lengths, bounds, fields }
 }

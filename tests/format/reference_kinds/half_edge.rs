@@ -111,7 +111,7 @@ fn corners_come_in_the_same_order() {
     let mut mesh = Mesh::new(&file);
     for block in 0..parts.len() as u32 {
         mesh.add_block(half_edge::block(&file, block, &parts[block as usize]));
-        for k in file.index.updates(block, &file.info) {
+        for k in file.updates(block) {
             mesh.apply(k);
             assert_eq!(mt.refine(&mut current, UpdateId(k)), Ok(Applied::Done));
             let found = (0..current.tet_slots() as u32).filter_map(|t| current.tet(t));

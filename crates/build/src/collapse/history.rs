@@ -10,7 +10,7 @@ use std::cmp::Reverse;
 use tetralod::mesh::NONE;
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, EdgeMt, EdgeMtBuilder, ErrorCode, Margins, MtInfo, MultiTessellation,
-    UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
+    UpdateError, UpdateId, VertexId, VertexSplit,
 };
 
 /// One collapse in the builder's own numbers: the `i`-th one makes vertex `points + i`.
@@ -42,7 +42,7 @@ impl Collapse {
 }
 
 /// The MT of a history, with its updates in the order that [`Updates::order`] gives them, and its vertex for each reference
-/// point. Pages have `2^block_bits` updates, 4 to 16 bits.
+/// point. Blocks of its file have `2^block_bits` updates, 4 to 16 bits.
 pub(crate) fn edge_mt(
     mut info: MtInfo,
     base: &WorkMesh,
@@ -72,12 +72,8 @@ pub(crate) fn edge_mt(
     let order: Vec<u32> = updates.order(block_bits).into_iter().map(|u| falling[u as usize]).collect();
     drop(first);
     replay.restore_margins(&falling, &found);
-    let (mt, vertices) = replay.make(info, &order, None, progress)?;
-    let mt = if mt.page_bits() == block_bits {
-        mt
-    } else {
-        mt.in_pages(block_bits).map_err(BuildError::Internal)?
-    };
+    let (mut mt, vertices) = replay.make(info, &order, None, progress)?;
+    mt.set_page_bits(block_bits);
     Ok((mt, vertices))
 }
 

@@ -8,6 +8,49 @@
 //! Each step reads and writes plain bytes, its result depends on nothing else, and takes memory for what is left of a part. The error
 //! of each update is measured at all reference vertices that it covers, exactly as in a whole: they travel with what is left.
 //!
+//! How tetrahedra are cut: into halves of halves, each across its longest side, by how many there are on both sides. A tetrahedron is
+//! where its lowest corner is. Parts are numbered by which side of each cut they are on, so those that are joined follow one another.
+//!
+//! ```text
+//!     one cut                   a cut in each half          four parts
+//!     +-----------------+       +---------+-------+         +---------+-------+
+//!     |         :       |       |         |   :   |         |    1    |   |   |
+//!     |         :       |       |. . . . .|   :   |         +---------+ 2 | 3 |
+//!     |         :       |       |         |   :   |         |    0    |   |   |
+//!     +-----------------+       +---------+-------+         +---------+---+---+
+//! ```
+//!
+//! A face behind which there is another part is neither inner, for its neighbour is not here, nor of the boundary, for there is one: in
+//! the mesh that a step works on, its neighbour is `ELSEWHERE`. Its corners are open: other parts have them, too, and they stay.
+//!
+//! ```text
+//!         part 0        part 1
+//!     N +-----o E   E o-----+ N         N  no tetrahedron: the boundary of the domain
+//!       | \   |       |   / |           E  the same face in both parts, each sees the other ELSEWHERE
+//!       |   \ |       | /   |           o  an open vertex, which both have and neither removes
+//!     N +-----o E   E o-----+ N
+//! ```
+//!
+//! How eight are joined: open vertices that nobody outside has become ordinary ones, and faces between the eight become inner ones again.
+//! So what stayed at them is simplified now, and nothing stays in the end.
+//!
+//! ```text
+//!     +---+---+---+---+         +-------+-------+         +---------------+
+//!     |   |   |   |   |         |       |       |         |               |
+//!     +---+---+---+---+   ->    |       |       |   ->    |               |
+//!     |   |   |   |   |         |       |       |         |               |
+//!     +---+---+---+---+         +-------+-------+         +---------------+
+//!     level 0: eight parts      level 1: two nodes        level 2: the whole
+//!     (four make one here, eight in space)
+//! ```
+//!
+//! What must hold:
+//! - The tetrahedra of all nodes of a level together are a conforming mesh of the domain: two nodes that meet have the same faces there.
+//! - An update depends on none but updates of its own node and of the nodes that it is joined into. What these remove is removed later,
+//!   and inserted earlier: the order of levels from the last to the first extends the partial order.
+//! - All reference vertices are in the buckets of tetrahedra of their node, so errors are those of a whole.
+//! - The parts follow from the mesh and the configuration, and not from how the mesh comes: in memory, as a grid alone, in pieces.
+//!
 //! ```
 //! use std::ops::ControlFlow;
 //! use tetralod_build::BuildConfig;

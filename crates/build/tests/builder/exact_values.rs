@@ -11,9 +11,9 @@ use tetralod::session::{Session, SessionError};
 use tetralod::stream::FileSource;
 use tetralod_build::{BuildConfig, BuildResult, build};
 
-/// A file of an edge-based MT with exact values, in small blocks, and the MT's vertex for each point.
+/// A file of a half-edge MT with exact values, in small blocks, and the MT's vertex for each point.
 fn file(mesh: &TetMesh) -> (Vec<u8>, Vec<VertexId>) {
-    let config = BuildConfig { all_lossless: true, block_bits: 4, ..BuildConfig::of(MtKind::Edge) };
+    let config = BuildConfig { all_lossless: true, block_bits: 4, ..BuildConfig::default() };
     let built = build(mesh, &config).expect("a mesh to build on");
     let BuildResult { mt, vertices, exact, .. } = built;
     let options = EncodeOptions { exact, ..EncodeOptions::default() };
@@ -69,7 +69,7 @@ fn a_client_has_exact_values_when_it_has_fetched_them() {
 #[test]
 fn a_file_without_exact_values_has_no_range_of_them() {
     let mesh = cube(5, &[hilly]);
-    let built = build(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a mesh");
+    let built = build(&mesh, &BuildConfig::default()).expect("a mesh");
     let bytes = encode(&built.mt, &EncodeOptions::default()).expect("a sound MT");
     let mut client = open(&bytes);
     client.refine(&Request::within(0.0)).expect("a sound file");
@@ -83,7 +83,7 @@ fn a_file_without_exact_values_has_no_range_of_them() {
 fn conversions_keep_exact_values() {
     let mesh = cube(6, &[hilly]);
     let (mut bytes, vertices) = file(&mesh);
-    for kind in [MtKind::Explicit, MtKind::Edge] {
+    for kind in [MtKind::Vertex, MtKind::HalfEdge] {
         let mut session = Session::new();
         session.feed(&bytes).expect("a sound file");
         session.finish().expect("a whole file");

@@ -10,15 +10,18 @@ mod state;
 #[cfg(test)]
 pub(super) mod tests;
 
-use super::{base, check_bytes, put_errors, put_quarterings, read_errors, read_quarterings};
-use crate::format::coder::{Family, Put, Source};
-use crate::format::{FormatError, Limits};
+use super::codec::{Codec, Head, InOrder, Parts, Started, put_in_order, sections_in_order};
+use super::{OWN_FALL, QUARTERINGS, base, check_bytes};
+use crate::format::coder::{Family, Models, Put, Source};
+use crate::format::header::Kind;
+use crate::format::section::Section;
+use crate::format::{EncodeError, FormatError, Limits};
 use crate::mt::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, Insertion, MtInfo, MultiTessellation, UpdateError,
-    UpdateId, UpdatePages, VertexMt,
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, ErrorCode, Insertion, Mt, MtInfo, MtKind,
+    MultiTessellation, UpdateError, UpdateId, VertexMt,
 };
 use numbers::{put_levels, put_one_of, put_position, read_levels, read_one_of, read_position};
-pub use state::State;
+use state::State;
 
 /// By how many codes an error is below the one before.
 const ERROR: Family = base::LAST.numbers_after(1, 2);
@@ -38,11 +41,9 @@ const FAR: Family = GIVEN_UP.after(20, 2);
 const SHORT: Family = FAR.numbers_after(1, 0);
 /// How far the level is from what is expected.
 const LEVEL: Family = SHORT.numbers_after(40, 1);
-/// The last family of vertex insertions.
-pub const LAST: Family = LEVEL;
 
 /// All families, with names for what they code.
-pub const PARTS: [(&str, Family); 9] = [
+const PARTS: Parts = &[
     ("errors", ERROR),
     ("partial order", FAN),
     ("positions", OFFSET),
@@ -61,13 +62,13 @@ const ELSEWHERE: u32 = 8;
 const MEASURED: u32 = 16;
 
 /// Bytes that every update takes in memory: a vertex, its own loop, the size of what it removes.
-pub fn least_update_bytes(info: &MtInfo) -> u64 {
+fn least_update_bytes(info: &MtInfo) -> u64 {
     let levels: u64 = info.fields.iter().map(|field| u64::from(field.bits)).sum();
     (3 * u64::from(info.lattice.bits) + levels + 9) / 8 + 4
 }
 
 /// An insertion adds one vertex.
-pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
     let vertices = base_vertices + u64::from(info.updates);
     if vertices != u64::from(info.vertices) {
         return Err(BaseMeshError::Info("base vertices and updates do not add up to the reference vertices"));
@@ -78,21 +79,90 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
     Ok(())
 }
 
+impl Codec for VertexMt {
+    const KIND: MtKind = MtKind::Vertex;
+    const NUMBER: u8 = 1;
+    const SECTION: Kind = Kind::INSV;
+    const PARTS: Parts = PARTS;
+    const HAS_TET_ERRORS: bool = true;
+
+    fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+        check_counts(info, base_vertices)
+    }
+
+    fn least_update_bytes(info: &MtInfo) -> u64 {
+        least_update_bytes(info)
+    }
+
+    fn put_head(&self, out: &mut impl Put) {
+        put_head(out, self);
+    }
+
+    fn read_head(
+        source: &mut Source<'_>,
+        _: &MtInfo,
+        _: [u32; 2],
+        _: u32,
+        _: &Limits,
+    ) -> Result<Box<dyn Head>, FormatError> {
+        Ok(Box::new(read_head(source)?))
+    }
+
+    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
+        let mut state = State::of(self).map_err(EncodeError::Base)?;
+        put_in_order(out, self, |out, updates| put(out, self, updates.start, updates.end, &mut state))
+    }
+
+    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
+        let mut state = State::of(self).map_err(EncodeError::Base)?;
+        sections_in_order(self, models, |out, updates| put(out, self, updates.start, updates.end, &mut state))
+    }
+}
+
+impl Head for InsertionRules {
+    fn start(
+        self: Box<Self>,
+        info: MtInfo,
+        base: BaseMesh,
+        block_bits: u32,
+        tet_errors: bool,
+    ) -> Result<Started, FormatError> {
+        let (mut mt, state) = start(info, base, *self, tet_errors)?;
+        mt.set_page_bits(block_bits);
+        Ok((mt.into(), Some(Box::new(state))))
+    }
+}
+
+impl InOrder for State {
+    fn read(
+        &mut self,
+        source: &mut Source<'_>,
+        mt: &mut Mt,
+        count: u32,
+        limits: &Limits,
+    ) -> Result<(), FormatError> {
+        match mt {
+            Mt::Vertex(mt) => read(source, mt, count, self, limits),
+            _ => Err(source.corrupt("a section is out of place")),
+        }
+    }
+}
+
 /// Puts what all insertions have in common: whether each makes the mesh larger, and the granularity of the coordinates.
-pub fn put_head(out: &mut impl Put, mt: &VertexMt) {
+fn put_head(out: &mut impl Put, mt: &VertexMt) {
     out.bits(u32::from(mt.always_grows()), 1);
     grain(mt).iter().for_each(|&x| out.bits(x as u32, 31));
 }
 
 /// What all insertions of an MT have in common.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct InsertionRules {
+struct InsertionRules {
     always_grows: bool,
     grain: [i32; 3],
 }
 
 /// Reads that.
-pub fn read_head(source: &mut Source<'_>) -> Result<InsertionRules, FormatError> {
+fn read_head(source: &mut Source<'_>) -> Result<InsertionRules, FormatError> {
     let always_grows = source.bits(1)? == 1;
     let mut grain = [0; 3];
     for x in &mut grain {
@@ -105,7 +175,7 @@ pub fn read_head(source: &mut Source<'_>) -> Result<InsertionRules, FormatError>
 }
 
 /// An MT without updates, and what to read its updates with.
-pub fn start(
+fn start(
     info: MtInfo,
     base: BaseMesh,
     rules: InsertionRules,
@@ -135,7 +205,7 @@ fn grain(mt: &VertexMt) -> [i32; 3] {
 ///
 /// # Errors
 /// If the MT is damaged, or an update removes what does not hang together.
-pub fn put(
+fn put(
     out: &mut impl Put,
     mt: &VertexMt,
     first: u32,
@@ -196,7 +266,7 @@ fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State)
 }
 
 /// Reads `count` updates into the MT.
-pub fn read(
+fn read(
     source: &mut Source<'_>,
     mt: &mut VertexMt,
     count: u32,
@@ -209,7 +279,6 @@ pub fn read(
             check_bytes(mt.bytes() + state.mesh.bytes(), limits)?;
         }
     }
-    mt.set_to_come(&state.errors);
     Ok(())
 }
 
@@ -250,4 +319,47 @@ fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) ->
     let update = mt.insert_into(mesh, &insertion)?;
     state.settle(update.0);
     Ok(())
+}
+
+/// Puts by how many codes each error of an update is below that of the update before.
+fn put_errors(out: &mut impl Put, family: Family, before: &mut [ErrorCode], errors: &[ErrorCode]) {
+    for (before, &error) in before.iter_mut().zip(errors) {
+        out.number(family, 0, u32::from(before.0.wrapping_sub(error.0)));
+        *before = error;
+    }
+}
+
+/// Turns the errors of the update before into those of the next one.
+fn read_errors(source: &mut Source<'_>, family: Family, errors: &mut [ErrorCode]) -> Result<(), FormatError> {
+    for error in errors {
+        let fall = u16::try_from(source.number(family, 0)?);
+        let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
+        error.0 = error.0.wrapping_sub(fall);
+    }
+    Ok(())
+}
+
+/// Puts the own errors of what an update removes: of each tetrahedron its quarterings, and whether it has the new vertex.
+fn put_quarterings(out: &mut impl Put, own_fall: u8, removed: impl Iterator<Item = (u8, bool)>) {
+    out.symbol(OWN_FALL, 0, u32::from(own_fall));
+    let mut before = 0;
+    for (own, is_home) in removed {
+        out.symbol(QUARTERINGS, 2 * before + u32::from(is_home), u32::from(own));
+        before = u32::from(own);
+    }
+}
+
+/// Reads them, of as many tetrahedra as there are in `are_home`; returns the fall of the own errors.
+fn read_quarterings(
+    source: &mut Source<'_>,
+    quarterings: &mut Vec<u8>,
+    are_home: impl Iterator<Item = bool>,
+) -> Result<u8, FormatError> {
+    let own_fall = source.symbol(OWN_FALL, 0)? as u8;
+    quarterings.clear();
+    for is_home in are_home {
+        let before = quarterings.last().map_or(0, |&before| u32::from(before));
+        quarterings.push(source.symbol(QUARTERINGS, 2 * before + u32::from(is_home))? as u8);
+    }
+    Ok(own_fall)
 }

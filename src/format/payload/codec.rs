@@ -1,0 +1,187 @@
+//! What the rest of the format knows of a kind of MT: each kind implements [`Codec`] in its own file.
+
+use super::changes::{bound_of, upper_byte};
+use crate::format::coder::{Counts, Family, Models, Put, Source, Writer};
+use crate::format::header::Kind;
+use crate::format::section::Section;
+use crate::format::{EncodeError, FormatError, Limits};
+use crate::mt::{
+    ApplyUpdates, BaseMesh, BaseMeshError, EdgeMt, ErrorCode, HalfEdgeMt, Mt, MtFacts, MtInfo, MtKind,
+    UpdateError, UpdateId, VertexMt,
+};
+use std::fmt::Debug;
+use std::ops::Range;
+
+/// Families of contexts, with names for what they code.
+pub type Parts = &'static [(&'static str, Family)];
+
+/// How files hold MTs of a kind.
+pub trait Codec: ApplyUpdates + Sized {
+    const KIND: MtKind;
+    /// The number of the kind in `INFO`.
+    const NUMBER: u8;
+    /// The section that a block begins with.
+    const SECTION: Kind;
+    /// The families that this kind has besides those of all kinds.
+    const PARTS: Parts;
+    /// Whether updates may contain errors of the tetrahedra that they remove.
+    const HAS_TET_ERRORS: bool = false;
+
+    /// What a description and a base mesh of so many vertices must be like.
+    fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError>;
+
+    /// Bytes that an update takes in memory, at least.
+    fn least_update_bytes(info: &MtInfo) -> u64;
+
+    /// Puts what stands in `BASE` behind the base mesh.
+    fn put_head(&self, out: &mut impl Put);
+
+    /// Reads what [`Codec::put_head`] puts, of a base mesh with so many vertices and tetrahedra.
+    fn read_head(
+        source: &mut Source<'_>,
+        info: &MtInfo,
+        counts: [u32; 2],
+        block_bits: u32,
+        limits: &Limits,
+    ) -> Result<Box<dyn Head>, FormatError>;
+
+    /// Puts all updates, block by block.
+    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError>;
+
+    /// How often each symbol occurs in what [`Codec::put_updates`] puts.
+    fn count_updates(&self) -> Result<Counts, EncodeError> {
+        let mut counts = Counts::default();
+        self.put_updates(&mut counts)?;
+        Ok(counts)
+    }
+
+    /// What is known from having applied all updates, if they were just made: it spares the encoder a run through them.
+    fn known_facts(&self) -> Option<&MtFacts> {
+        None
+    }
+
+    /// The sections of each block.
+    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError>;
+}
+
+/// What stands in `BASE` behind the base mesh, until the levels of that are here, too.
+pub trait Head: Debug + Send + Sync {
+    /// See [`Started`].
+    fn start(
+        self: Box<Self>,
+        info: MtInfo,
+        base: BaseMesh,
+        block_bits: u32,
+        tet_errors: bool,
+    ) -> Result<Started, FormatError>;
+}
+
+/// An MT without updates, and what reads these if they come in order.
+pub type Started = (Mt, Option<Box<dyn InOrder>>);
+
+/// What reads updates that come in order, block by block.
+pub trait InOrder: Debug + Send + Sync {
+    /// Reads the next `count` updates into the MT.
+    fn read(
+        &mut self,
+        source: &mut Source<'_>,
+        mt: &mut Mt,
+        count: u32,
+        limits: &Limits,
+    ) -> Result<(), FormatError>;
+}
+
+/// For each block and field what bounds the errors of the updates behind the block: see [`upper_byte`].
+fn bounds_behind(mt: &impl Codec) -> Vec<Vec<u8>> {
+    let mut bounds = Vec::new();
+    let mut largest = vec![ErrorCode::ZERO; mt.info().fields.len()];
+    for block in (0..mt.updates().div_ceil(1 << mt.page_bits())).rev() {
+        bounds.push(largest.iter().copied().map(upper_byte).collect());
+        for u in mt.page_updates(block).map(UpdateId) {
+            largest.iter_mut().zip(mt.errors(u)).for_each(|(bound, &error)| *bound = (*bound).max(error));
+        }
+    }
+    bounds.reverse();
+    bounds
+}
+
+/// Reads what bounds the errors of the updates behind a block that is one of those in order.
+pub fn read_bounds(source: &mut Source<'_>, fields: usize) -> Result<Vec<ErrorCode>, FormatError> {
+    (0..fields).map(|_| Ok(bound_of(source.bits(8)? as u8))).collect()
+}
+
+/// [`Codec::put_updates`] where blocks come in order. `put` gets the updates of each.
+pub fn put_in_order<P: Put>(
+    out: &mut P,
+    mt: &impl Codec,
+    mut put: impl FnMut(&mut P, Range<u32>) -> Result<(), UpdateError>,
+) -> Result<(), EncodeError> {
+    for (block, bounds) in (0..).zip(bounds_behind(mt)) {
+        bounds.into_iter().for_each(|bound| out.bits(u32::from(bound), 8));
+        put(out, mt.page_updates(block)).map_err(EncodeError::Update)?;
+    }
+    Ok(())
+}
+
+/// [`Codec::sections`] where blocks come in order, and have one section each. `put` gets the updates of each.
+pub fn sections_in_order<C: Codec>(
+    mt: &C,
+    models: &Models,
+    mut put: impl FnMut(&mut Writer<'_>, Range<u32>) -> Result<(), UpdateError>,
+) -> Result<Vec<Vec<Section>>, EncodeError> {
+    let mut sections = Vec::new();
+    for (block, bounds) in (0..).zip(bounds_behind(mt)) {
+        let mut done = Ok(());
+        let section = Section::coded(C::SECTION, &[block], models, |out| {
+            bounds.into_iter().for_each(|bound| out.bits(u32::from(bound), 8));
+            done = put(out, mt.page_updates(block));
+        });
+        done.map_err(EncodeError::Update)?;
+        sections.push(vec![section?]);
+    }
+    Ok(sections)
+}
+
+/// The codec of a kind as far as whoever reads a file needs it.
+pub struct KindCodec {
+    pub kind: MtKind,
+    pub number: u8,
+    pub section: Kind,
+    parts: Parts,
+    pub has_tet_errors: bool,
+    pub check_counts: fn(&MtInfo, u64) -> Result<(), BaseMeshError>,
+    pub least_update_bytes: fn(&MtInfo) -> u64,
+    pub read_head: ReadHead,
+}
+
+/// See [`Codec::read_head`].
+type ReadHead = fn(&mut Source<'_>, &MtInfo, [u32; 2], u32, &Limits) -> Result<Box<dyn Head>, FormatError>;
+
+impl KindCodec {
+    const fn of<C: Codec>() -> Self {
+        Self {
+            kind: C::KIND,
+            number: C::NUMBER,
+            section: C::SECTION,
+            parts: C::PARTS,
+            has_tet_errors: C::HAS_TET_ERRORS,
+            check_counts: C::check_counts,
+            least_update_bytes: C::least_update_bytes,
+            read_head: C::read_head,
+        }
+    }
+
+    /// The families of the kind, in the order of their contexts, with names for what they code.
+    pub fn parts(&self) -> Vec<(&'static str, Family)> {
+        super::parts(self.parts)
+    }
+}
+
+/// Of all kinds that files have.
+pub static CODECS: [KindCodec; 3] =
+    [KindCodec::of::<EdgeMt>(), KindCodec::of::<VertexMt>(), KindCodec::of::<HalfEdgeMt>()];
+
+/// The codec of a kind; none of one that no file has.
+pub fn codec_of(kind: MtKind) -> Option<&'static KindCodec> {
+    CODECS.iter().find(|codec| codec.kind == kind)
+}
