@@ -25,7 +25,7 @@ const MARGIN = 12;
 const PAUSE = 250;
 /** The four corners of the faces of a box in each direction: a bit an axis says which end. */
 const FACES = [0, 1, 2].flatMap((axis) => {
-  const [one, other] = [1 << (axis + 1) % 3, 1 << (axis + 2) % 3];
+  const [one, other] = [1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3)];
   return [0, 1 << axis].map((side) => ({ axis, isUpper: side > 0, corners: [side, side | one, side | one | other, side | other] }));
 });
 

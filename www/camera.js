@@ -2,8 +2,8 @@
 
 import { $, input, select } from "./dom.js";
 import { fail } from "./messages.js";
-import { viewer } from "./page.js";
-import { cameraWords, homeCamera, setHome, store } from "./state.js";
+import { page, viewer } from "./page.js";
+import { cameraWords, store } from "./state.js";
 
 /** @typedef {import("./state.js").Camera} Camera */
 
@@ -15,7 +15,7 @@ let isThere = true;
 /** @param {Camera} camera */
 function moved(camera) {
   const words = cameraWords(camera);
-  if (!homeCamera()) setHome(camera);
+  page.home ??= camera;
   isThere ||= words === given;
   if (!isThere) return;
   given = words;
@@ -24,7 +24,7 @@ function moved(camera) {
 
 /** Gives the viewer the camera of the state, unless it comes from there. */
 function apply() {
-  const camera = store.state.camera ?? homeCamera();
+  const camera = store.state.camera ?? page.home;
   input("orthographic").checked = camera?.projection === "orthographic";
   if (!camera || cameraWords(camera) === given) return;
   const mine = (given = cameraWords(camera));
@@ -37,7 +37,7 @@ function apply() {
 
 /** Another volume has arrived, and the viewer shows it from where it likes. */
 export function cameraIsNew() {
-  setHome(viewer().state.camera);
+  page.home = viewer().state.camera;
   given = undefined;
 }
 

@@ -16,7 +16,7 @@ const LOG_START = 1e-3;
 let range = [0, 1];
 /** Counts the choices of a range: late answers are ignored. */
 let chosen = 0;
-/** What is told when the range is another. */
+/** Draws with a range that has come late. */
 let draw = () => {};
 
 /** @returns {import("tetralod/viewer").ColourState} */
@@ -46,14 +46,23 @@ function choose() {
   if (Array.isArray(wanted)) take(wanted);
   else if (wanted === "symmetric") take([-most, most]);
   else if (wanted === "data") take([min, max]);
-  else percentiles().then((found) => mine === chosen && demo.info && take(found));
+  else {
+    percentiles().then((found) => {
+      if (mine !== chosen || !demo.info) return;
+      take(found);
+      draw();
+    });
+  }
 }
 
 /** @returns {Promise<[number, number]>} */
 async function percentiles() {
   const { min, max } = shownField();
   const known = percentilesAtAllTimes(PERCENTILES);
-  const asked = () => viewer().stats({ bins: 1000, fractions: PERCENTILES }).then(({ percentiles }) => Array.from(percentiles));
+  const asked = () =>
+    viewer()
+      .stats({ bins: 1000, fractions: PERCENTILES })
+      .then(({ percentiles }) => Array.from(percentiles));
   const [low, high] = known ?? (await asked().catch(() => [min, max]));
   return low < high ? [low, high] : [min, max];
 }
@@ -66,7 +75,6 @@ function take([low, high]) {
   range = needs ? [end * LOG_START, end] : [low, high];
   $("range-note").hidden = !needs;
   showRange();
-  draw();
 }
 
 function showRange() {
@@ -75,7 +83,10 @@ function showRange() {
   const symmetric = select("range-preset").querySelector("option[value=symmetric]");
   symmetric?.toggleAttribute("disabled", log);
   const [low, high] = range;
-  for (const [id, value] of /** @type {const} */ ([["range-low", low], ["range-high", high]])) {
+  for (const [id, value] of /** @type {const} */ ([
+    ["range-low", low],
+    ["range-high", high],
+  ])) {
     input(id).setCustomValidity("");
     if (document.activeElement !== input(id)) input(id).value = String(Math.abs(value) < 1e-9 * (high - low) ? 0 : precise(value, high - low, 5));
   }
@@ -93,9 +104,9 @@ function typed() {
   if (isRange && isPositive) store.change({ range: [lower, upper] });
 }
 
-/** @param {() => void} onChange is called when the range is another */
-export function attachColours(onChange) {
-  draw = onChange;
+/** @param {() => void} onLate draws with a range that has come late */
+export function attachColours(onLate) {
+  draw = onLate;
   const preset = select("range-preset");
   preset.addEventListener("input", () => {
     const { value } = preset;

@@ -22,9 +22,6 @@ function showComparison() {
 }
 
 export function attachComparison() {
-  input("freeze").addEventListener("input", () => store.change({ freeze: input("freeze").checked }));
-  input("split").addEventListener("input", () => store.change({ split: input("split").valueAsNumber }));
-  input("difference").addEventListener("input", () => store.change({ difference: input("difference").checked }));
   let isKeeping = false;
   button("keep").addEventListener("click", () => {
     // Pressed again it forgets the mesh, also while that is on its way.
@@ -40,11 +37,12 @@ export function attachComparison() {
   let isFrozen = false;
   store.subscribe(["freeze"], () => {
     const { freeze } = store.state;
-    input("freeze").checked = freeze;
     if (freeze === isFrozen) return;
     isFrozen = freeze;
     // While another volume is opened, it does not matter.
-    viewer().freeze(freeze).catch((error) => demo.info && fail(error));
+    viewer()
+      .freeze(freeze)
+      .catch((error) => demo.info && fail(error));
   });
   store.subscribe(["kept", "split", "difference"], showComparison);
 }

@@ -3,7 +3,18 @@
 import { $, all, svg } from "./dom.js";
 
 /** What of the style of an SVG shape is copied, since the style sheet of the page is not in the picture. */
-const STYLES = ["fill", "stroke", "stroke-width", "stroke-linejoin", "stroke-dasharray", "paint-order", "text-anchor", "font-size", "font-weight", "font-family"];
+const STYLES = [
+  "fill",
+  "stroke",
+  "stroke-width",
+  "stroke-linejoin",
+  "stroke-dasharray",
+  "paint-order",
+  "text-anchor",
+  "font-size",
+  "font-weight",
+  "font-family",
+];
 /** Of the colour bar, in pixels of the page. */
 const BAR = 12;
 

@@ -8,10 +8,34 @@ export const FIRST = "ramp";
 
 /** Those that have names; `at` is the fraction of the isovalue. @type {Record<string, (at: number) => Point[]>} */
 const PRESETS = {
-  ramp: () => [[0, 0], [0.3, 0], [1, 0.8]],
-  peak: () => [[0, 0], [0.38, 0], [0.5, 0.8], [0.62, 0], [1, 0]],
-  step: (at) => [[0, 0], [at, 0], [at, 0.5], [1, 0.5]],
-  shells: () => [[0, 0], [0.3, 0], [0.34, 0.25], [0.38, 0], [0.62, 0], [0.66, 0.7], [0.7, 0], [1, 0]],
+  ramp: () => [
+    [0, 0],
+    [0.3, 0],
+    [1, 0.8],
+  ],
+  peak: () => [
+    [0, 0],
+    [0.38, 0],
+    [0.5, 0.8],
+    [0.62, 0],
+    [1, 0],
+  ],
+  step: (at) => [
+    [0, 0],
+    [at, 0],
+    [at, 0.5],
+    [1, 0.5],
+  ],
+  shells: () => [
+    [0, 0],
+    [0.3, 0],
+    [0.34, 0.25],
+    [0.38, 0],
+    [0.62, 0],
+    [0.66, 0.7],
+    [0.7, 0],
+    [1, 0],
+  ],
 };
 
 /** @param {Curve} curve @param {number} isovalue as a fraction of the field's range @returns {readonly Point[]} */

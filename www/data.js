@@ -116,7 +116,8 @@ function showBought() {
     parts.push(shape("text", { x: x(at), y: height - bottom + 15 }, at === 0 ? "0" : size(at)));
   }
   parts.push(shape("text", { x: (left + width - right) / 2, y: height - 4 }, "bytes that have arrived"));
-  const line = (/** @type {{ bytes: number, error: number }[]} */ points) => `M${points.map(({ bytes, error }) => `${x(bytes).toFixed(1)} ${y(error).toFixed(1)}`).join("L")}`;
+  const line = (/** @type {{ bytes: number, error: number }[]} */ points) =>
+    `M${points.map(({ bytes, error }) => `${x(bytes).toFixed(1)} ${y(error).toFixed(1)}`).join("L")}`;
   if (near.length > 1) parts.push(shape("path", { d: line(near), class: "stated" }));
   parts.push(shape("path", { d: line(good) }));
   parts.push(...good.map(({ bytes, error }) => shape("circle", { cx: x(bytes), cy: y(error), r: 2.5 })));

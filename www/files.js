@@ -21,7 +21,12 @@ export async function takeFiles(files) {
   if (takeMesh(files, (built) => openBuilt(built, files))) return;
   const [file] = files;
   // An empty file, and one that cannot be read, are for whoever opens them.
-  const start = new Uint8Array(await file.slice(0, START.length).arrayBuffer().catch(() => new ArrayBuffer(0)));
+  const start = new Uint8Array(
+    await file
+      .slice(0, START.length)
+      .arrayBuffer()
+      .catch(() => new ArrayBuffer(0)),
+  );
   const isOther = start.some((byte, i) => byte !== START[i]);
   if (isOther && !/\.mt$/i.test(file.name)) return say("This page does not read the file", { message: wordsFor(file.name) });
   open(file);

@@ -7,7 +7,7 @@ import { $, dialog, element, input, select } from "./dom.js";
 import { count, size, vtuBytes } from "./format.js";
 import { note } from "./messages.js";
 import { open } from "./opening.js";
-import { openSource } from "./source.js";
+import { source } from "./source.js";
 import { read } from "./state.js";
 import { pictureOf, taken, takePicture } from "./thumbnails.js";
 
@@ -135,5 +135,5 @@ export function attachGallery() {
     open(url);
   });
   // A new volume may be there when the user comes back.
-  window.addEventListener("focus", () => openSource() !== undefined && readVolumes());
+  window.addEventListener("focus", () => source.open !== undefined && readVolumes());
 }

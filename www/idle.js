@@ -53,4 +53,4 @@ export function showIdle() {
   for (const option of all("#colour-by [value=block], #colour-by [value=missing]")) setIdle(option, others["map-blocks"]);
 }
 
-export const attachIdle = () => store.subscribe(undefined, showIdle);
+export const attachIdle = () => store.subscribe(["view", "also", "opacities", "shape", "field", "kept", "difference", "probes"], showIdle);

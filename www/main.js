@@ -4,7 +4,7 @@
  *
  * - `store`, `state`, `history`: what is set, in one store; its words; the address, undo and redo, which are made of it
  * - `page`, `volume`, `source`: what has come of the volume, what it has, where it comes from
- * - `opening`, `gallery`, `thumbnails`, `files`, `build`, `repair`: opening a volume, from the list or of the user
+ * - `opening`, `fitting`, `gallery`, `thumbnails`, `files`, `build`, `repair`: opening a volume, from the list or of the user; what of the settings fits it
  * - `parts`, `planes`, `fields`, `play`, `region`, `request`: controls, and what is asked of the mesh
  * - `scene`, `colours`, `curve`, `transfer`, `histogram`, `bins`, `flow`, `compare`, `theme`: how it looks
  * - `camera`, `controls`, `picture`, `keys`, `tabs`: where it is looked from; mouse, touch and keys
@@ -47,7 +47,7 @@ import { Probes } from "./probes.js";
 import { attachRegion, boxWasDragged, useBox } from "./region.js";
 import { attachRequest } from "./request.js";
 import { attachScene, draw, showLegend } from "./scene.js";
-import { setFirst } from "./source.js";
+import { source } from "./source.js";
 import { attachState, read, store } from "./state.js";
 import { attachTabs } from "./tabs.js";
 import { attachTheme } from "./theme.js";
@@ -94,8 +94,8 @@ async function start() {
   page.transfer = new TransferEditor();
   // Controls first, then what is made of their values: the request and the scene, then what is said of these.
   for (const attach of [attachState, attachParts, attachPlanes, attachFields, attachPlay, attachFlow, attachComparison, attachHistogram]) attach();
-  for (const attach of [attachCamera, attachRegion, attachRequest, attachScene, attachEmpty, attachIdle, attachPicture]) attach();
   attachColours(draw);
+  for (const attach of [attachCamera, attachRegion, attachRequest, attachScene, attachEmpty, attachIdle, attachPicture]) attach();
   attachFiles();
   attachHistory();
   attachGallery();
@@ -138,7 +138,7 @@ async function begin(listed) {
     $("growth").textContent = "";
     return openGallery();
   }
-  setFirst(first ?? "");
+  source.first = first ?? "";
   const isPlain = !asked && Object.keys(words).length === 0 && !url;
   open(url, isPlain ? sceneOf(first) : words);
 }

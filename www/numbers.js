@@ -4,6 +4,7 @@ import { $, all, announce, element } from "./dom.js";
 import { noteEmpty, showEmpty } from "./empty.js";
 import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./format.js";
 import { showHistogram } from "./histogram.js";
+import { showIdle } from "./idle.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { budget, errorPixels } from "./request.js";
@@ -12,7 +13,9 @@ import { originOf } from "./source.js";
 /** @param {import("tetralod/viewer").ViewerProgress} progress */
 export function showProgress({ bytes, total, complete, blocks }) {
   demo.receivedBytes = bytes;
+  const isNews = !demo.blocks !== !blocks;
   demo.blocks = blocks;
+  if (isNews) showIdle();
   for (const row of all(".of-blocks")) row.hidden = !blocks;
   if (blocks) return showBlocks(blocks, bytes);
   const known = total ?? demo.totalBytes;

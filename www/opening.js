@@ -3,12 +3,13 @@
 import { cameraIsNew } from "./camera.js";
 import { $, select } from "./dom.js";
 import { listFields } from "./fields.js";
+import { showFitting } from "./fitting.js";
 import { nameOf } from "./format.js";
 import { fail, hideMessage, note } from "./messages.js";
 import { showGrowth } from "./numbers.js";
 import { demo, viewer } from "./page.js";
-import { fileNameIn, isNew, openSource, setOrigin, setSource, setTried, sourceOf, triedSource } from "./source.js";
-import { carriedOver, showFitting, store } from "./state.js";
+import { fileNameIn, isNew, setOrigin, source, sourceOf } from "./source.js";
+import { carriedOver, store } from "./state.js";
 
 /** @typedef {import("./source.js").Source} Source */
 /** @typedef {import("./state.js").Words} Words */
@@ -45,11 +46,11 @@ export function openBuilt(built, files) {
 export async function open(wanted, words) {
   const from = sourceOf(wanted);
   if (!from) return wait({ name: fileNameIn(String(wanted)) ?? "", words });
-  const before = { ...demo, source: openSource() };
+  const before = { ...demo, from: source.open };
   const ofLink = from instanceof File && from.name === awaited?.name ? awaited.words : undefined;
   awaited = undefined;
   const shown = words ?? ofLink ?? (demo.info ? carriedOver() : {});
-  setTried(from);
+  source.open = source.tried = from;
   showInList(from);
   const mine = ++opening;
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined, request: undefined, blocks: undefined });
@@ -88,21 +89,21 @@ function wait(file) {
   fail({ code: "no-file", message });
 }
 
-/** What could not be opened has not taken the place of the volume before: that stays, with its settings. @param {typeof demo & { source?: Source }} before */
-function stay({ source, ...before }) {
-  if (!source || !before.info || viewer().info !== before.info) return;
-  setSource(source);
+/** What could not be opened has not taken the place of the volume before: that stays, with its settings. @param {typeof demo & { from?: Source }} before */
+function stay({ from, ...before }) {
+  if (!from || !before.info || viewer().info !== before.info) return;
+  source.open = from;
   Object.assign(demo, { ...before, frames: demo.frames });
   // What was set meanwhile is of it.
   store.replace({});
-  showInList(source);
+  showInList(from);
   showGrowth();
   $("legend").hidden = !viewer().legend;
 }
 
 /** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
 export async function retry() {
-  if (isNew() || !demo.blocks || demo.error?.code === "changed") return open(triedSource() ?? "");
+  if (isNew() || !demo.blocks || demo.error?.code === "changed") return open(source.tried ?? "");
   hideMessage();
   demo.error = undefined;
   demo.state = "streaming";

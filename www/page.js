@@ -40,9 +40,9 @@ export function viewer() {
 }
 
 /**
- * What is made once the viewer has started.
+ * What is made once the viewer has started; `home` is the camera with which the volume is shown first.
  *
- * @type {{ overlay: import("./overlay.js").OverlayView, probes: import("./probes.js").Probes,
+ * @type {{ home?: import("tetralod/viewer").CameraState, overlay: import("./overlay.js").OverlayView, probes: import("./probes.js").Probes,
  *   transfer: import("./transfer.js").TransferEditor }}
  */
 export const page = /** @type {any} */ ({});

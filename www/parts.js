@@ -34,7 +34,10 @@ export const opacityOf = (name) => store.state.opacities[name] / 100;
 export const hasEdges = (name) => store.state.edges[name];
 
 /** What is beside the view, in the order of the row. @param {(name: string) => boolean} isBeside */
-const chosen = (isBeside) => boxes().map(({ value }) => value).filter(isBeside);
+const chosen = (isBeside) =>
+  boxes()
+    .map(({ value }) => value)
+    .filter(isBeside);
 
 /** Chooses another view: if it was beside the one before, both stay. @param {Mode} to */
 export function turnTo(to) {

@@ -1,6 +1,5 @@
 /** A plot of values along a line, as SVG: gaps where the line is outside of the domain. */
 
-
 import { shape } from "./dom.js";
 
 /** Room around the plot, in pixels. */
@@ -21,7 +20,10 @@ export function linePlot(svg, profile, { length, label }) {
     svg.replaceChildren(shape("text", { x: width / 2, y: height / 2, class: "none" }, "no data between the points"));
     return;
   }
-  const [low, high] = widened(values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b)));
+  const [low, high] = widened(
+    values.reduce((a, b) => Math.min(a, b)),
+    values.reduce((a, b) => Math.max(a, b)),
+  );
   const x = (/** @type {number} */ part) => left + part * (width - left - right);
   const y = (/** @type {number} */ value) => top + (1 - (value - low) / (high - low)) * (height - top - bottom);
   const parts = [];

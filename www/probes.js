@@ -91,7 +91,9 @@ export class Probes {
     const mine = ++this.#asked;
     const ask = async () => {
       const start = performance.now();
-      const found = await viewer().pick(...point).catch(() => undefined);
+      const found = await viewer()
+        .pick(...point)
+        .catch(() => undefined);
       this.#took = performance.now() - start;
       if (mine === this.#asked && demo.info) this.#readOut(found, place);
     };
@@ -125,8 +127,18 @@ export class Probes {
     const before = this.#pins;
     // While another volume is being opened, nothing is known of what is read.
     if (before.length === 0 || !demo.info) return;
-    const read = await Promise.all(before.map(({ position }) => viewer().reading(position).catch(() => undefined)));
-    if (before === this.#pins && demo.info) this.#show(read.map((found, i) => found ?? before[i]), this.#read);
+    const read = await Promise.all(
+      before.map(({ position }) =>
+        viewer()
+          .reading(position)
+          .catch(() => undefined),
+      ),
+    );
+    if (before === this.#pins && demo.info)
+      this.#show(
+        read.map((found, i) => found ?? before[i]),
+        this.#read,
+      );
   }
 
   /** The box between the points that are shown at two points of the canvas. @param {Spot} one @param {Spot} other */

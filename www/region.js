@@ -1,6 +1,6 @@
 /** The region of the request: a box with handles, the sphere in it, or the side of the clip plane that is shown. */
 
-import { $, all, } from "./dom.js";
+import { $, all } from "./dom.js";
 import { diagonalOf, precise } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
@@ -62,7 +62,9 @@ function showRegion() {
   page.overlay.sphere = store.state.region === "sphere" ? sphereIn(box) : undefined;
   const handles = box === dragged ? {} : { region: on ? box : null };
   dragged = undefined;
-  viewer().set({ ...handles, clipBox: cutBox() ?? null }).catch(fail);
+  viewer()
+    .set({ ...handles, clipBox: cutBox() ?? null })
+    .catch(fail);
 }
 
 const inputs = () => /** @type {HTMLInputElement[]} */ (all("#box input"));

@@ -58,6 +58,7 @@ function refine() {
   coming = viewer()
     .refine(wanted)
     .catch((error) => {
+      if (demo.request === wanted) demo.request = undefined;
       if (error.code !== "freed" && error.code !== "not-ready") fail(error);
     });
 }

@@ -7,7 +7,7 @@ import { $, element, text } from "./dom.js";
 import { isovalue, isovaluePart, shownField } from "./fields.js";
 import { flowIsByField, flowScene, flowUnit, seedQuad } from "./flow.js";
 import { fail } from "./messages.js";
-import { demo, page, viewer, volume } from "./page.js";
+import { demo, page, viewer } from "./page.js";
 import { beside, hasEdges, mode, opacityOf, shows } from "./parts.js";
 import { plane } from "./planes.js";
 import { store } from "./state.js";
@@ -21,7 +21,7 @@ import { rangeOf } from "./volume.js";
 export const LOOKS = /** @type {const} */ ([
   ...["view", "also", "opacities", "edges", "field", "time", "surface-colour", "vector", "isovalue", "places", "axis", "flip"],
   ...["shape", "shrink", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "seeds", "transfer", "map", "reversed"],
-  ...["log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
+  ...["range", "log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
 ]);
 
 /** The surface of the domain around other parts. */
@@ -87,7 +87,9 @@ export function draw() {
   const diverging = compare?.difference ? { map: "coolwarm" } : {};
   const range = shows("iso") && by && !isByField() ? { range: ownRange(by) } : {};
   const looks = { colours: { ...colours(), ...range, ...diverging }, background: background(), compare, outline, shade: shade / 100 };
-  viewer().set(Object.assign(nothing, ...parts, looks)).catch(fail);
+  viewer()
+    .set(Object.assign(nothing, ...parts, looks))
+    .catch(fail);
 }
 
 /** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. @param {string} name @returns {[number, number]} */
@@ -100,11 +102,11 @@ function ownRange(name) {
 /** The colour bar of what is drawn. @param {import("tetralod/viewer").Legend | undefined} legend */
 export function showLegend(legend) {
   $("legend").hidden = !legend;
-  if (!legend || !demo.info) return page.overlay.refresh();
+  if (!legend) return page.overlay.refresh();
   const { label, ticks } = legend;
   const unit = unitOf(label);
   $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
-  if (label === store.state.field) $("transfer-bar").style.background = gradient(legend);
+  if (demo.info && label === store.state.field) $("transfer-bar").style.background = gradient(legend);
   $("legend-bar").dataset.colours = legend.colours.join(" ");
   $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
   // The ends of the range are shown in any case, what is between them where there is room.
@@ -117,7 +119,8 @@ export function showLegend(legend) {
 
 /** The unit of what a legend is of: a field, or the length of the vector that is shown. @param {string} label */
 function unitOf(label) {
-  const field = volume().fields.find(({ name }) => name === label);
+  if (!demo.info) return "";
+  const field = demo.info.fields.find(({ name }) => name === label);
   return field?.unit ?? (shows("flow") ? flowUnit() : "");
 }
 
@@ -140,4 +143,8 @@ function leaveOutOverlaps(ticks) {
   }
 }
 
-export const attachScene = () => store.subscribe(LOOKS, draw);
+export function attachScene() {
+  store.subscribe(LOOKS, draw);
+  // The colour bar may come before the volume, which has the units.
+  store.subscribe(["field"], () => !$("legend").hidden && showLegend(viewer().legend));
+}

@@ -7,12 +7,13 @@ import { demo } from "./page.js";
 
 const FILE = "file:";
 
-/** @type {Source | undefined} */
-let source;
-/** What was opened last, perhaps in vain: the button "Try again" opens it again. @type {Source | undefined} */
-let tried;
-/** What the page opens by itself. */
-let first = "";
+/**
+ * What is open; what was opened last, perhaps in vain: the button "Try again" opens it again; and what is open where no address says
+ * anything else.
+ *
+ * @type {{ open?: Source, tried?: Source, first: string }}
+ */
+export const source = { first: "" };
 /** Files of the user, by their names: undo may come back to them. @type {Map<string, File>} */
 const files = new Map();
 /** What MT files were built of by the page: in words, and its bytes. @type {WeakMap<File, { format: string, bytes: number }>} */
@@ -26,35 +27,21 @@ export function setOrigin(built, files) {
 }
 
 /** What the volume was built of, if the page has built it. */
-export const originOf = () => (source instanceof File ? origins.get(source) : undefined);
+export const originOf = () => (source.open instanceof File ? origins.get(source.open) : undefined);
 
 /** The name of the volume, for files that are made of it. */
-export const volumeName = () => (source ? nameOf(source).replace(/\.mt$/i, "") : "tetralod");
-
-/** Says what is open where no address says anything else. @param {string} url */
-export const setFirst = (url) => void (first = url);
-
-/** @param {Source | undefined} from */
-export const setSource = (from) => void (source = from);
-
-/** Notes what is being opened. @param {Source} from */
-export function setTried(from) {
-  source = tried = from;
-}
-
-export const openSource = () => source;
-export const triedSource = () => tried;
+export const volumeName = () => (source.open ? nameOf(source.open).replace(/\.mt$/i, "") : "tetralod");
 
 /** Whether what was opened last comes from a server. */
-export const isRemote = () => !(tried instanceof File);
+export const isRemote = () => !(source.tried instanceof File);
 
 /** Whether nothing has come of what was opened last. */
-export const isNew = () => tried !== source || !demo.info;
+export const isNew = () => source.tried !== source.open || !demo.info;
 
 /** What is open, as in the address of the page. */
 export function sourceWords() {
-  if (source instanceof File) return `${FILE}${source.name}`;
-  return source === first ? "" : (source ?? "");
+  const { open = "", first } = source;
+  return open instanceof File ? `${FILE}${open.name}` : open === first ? "" : open;
 }
 
 /** The name of a file that is part of an address, if that is one of a file. @param {string} words */
@@ -67,5 +54,5 @@ export function sourceOf(wanted) {
     return wanted;
   }
   const name = fileNameIn(wanted);
-  return name === undefined ? wanted || first : files.get(name);
+  return name === undefined ? wanted || source.first : files.get(name);
 }

@@ -6,10 +6,10 @@
 
 import { curveOf, curveWords } from "./curve.js";
 import { $, named } from "./dom.js";
-import { precise, rounded } from "./format.js";
-import { demo, volume } from "./page.js";
+import { precise } from "./format.js";
+import { demo, page } from "./page.js";
 import { Store } from "./store.js";
-import { fieldNames, inner, isInside, rangeOf, stepsOf, vectors } from "./volume.js";
+import { fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js";
 
 /** @typedef {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} Mode */
 /** @typedef {import("tetralod/viewer").CameraState} Camera */
@@ -17,10 +17,10 @@ import { fieldNames, inner, isInside, rangeOf, stepsOf, vectors } from "./volume
 /** The values of the first and the last colour. @typedef {"data" | "percentiles" | "symmetric" | [low: number, high: number]} Range */
 /** @typedef {Record<string, string>} Words */
 
-/** Controls that have a value of their own, which no volume takes away: they are bound to it by their ids. */
+/** Controls that have a value of their own, which no volume takes away: they are bound to it by their ids. Those that compare meshes have no entry. */
 const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
-  ["outline", "inside", "arrows", "flow-boundary", "reversed", "log", "flip", "focus", "axes", "fly"],
-  ["shrink", "shade", "rake", "pixels", "budget", "frame-time"],
+  ["outline", "inside", "arrows", "flow-boundary", "reversed", "log", "flip", "focus", "axes", "fly", "freeze", "difference"],
+  ["shrink", "shade", "rake", "pixels", "budget", "frame-time", "split"],
   ["shape", "colour-by", "flow-colour", "map", "axis", "region", "background"],
 ]);
 
@@ -47,11 +47,9 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
  * @property {Camera | undefined} camera that with which the volume is shown first without it
  */
 
-/** What is not in the address. @typedef {{ playing: boolean, dark: boolean, freeze: boolean, kept: boolean, split: number, difference: boolean }} Passing */
-
 /**
  * @typedef {Record<(typeof FLAGS)[number], boolean> & Record<(typeof SLIDERS)[number], number> & Record<(typeof CHOICES)[number], string>
- *   & Others & Passing} State
+ *   & Others & { playing: boolean, dark: boolean, kept: boolean }} State
  */
 
 /** Words of the address: `get` gives none for what there is first, `set` never gets none and tells whether they mean something. */
@@ -68,12 +66,12 @@ export const MIDDLE = 500;
 const CAMERA_DIGITS = 9;
 
 /** @param {string} words */
-const numbers = (words) => words.split(",").map(Number);
+export const numbers = (words) => words.split(",").map(Number);
 /** @param {string} words @param {number} count */
-const isNumbers = (words, count) => numbers(words).length === count && numbers(words).every(Number.isFinite);
+export const isNumbers = (words, count) => numbers(words).length === count && numbers(words).every(Number.isFinite);
 
-/** @param {string} words */
-function points(words) {
+/** Points of the model; none where a word is no number. @param {string} words */
+export function points(words) {
   const all = words ? numbers(words) : [];
   const found = all.flatMap((_, i) => (i % 3 === 0 && i + 2 < all.length ? [/** @type {Point} */ (all.slice(i, i + 3))] : []));
   return all.every(Number.isFinite) ? found : [];
@@ -181,20 +179,15 @@ export function cameraWords({ target, distance, yaw, pitch, projection }) {
   return `${all}${projection === "orthographic" ? ",orthographic" : ""}`;
 }
 
-/** The camera with which the volume is shown first. @type {Camera | undefined} */
-let home;
-
-/** @param {Camera | undefined} camera */
-export const setHome = (camera) => void (home = camera);
-export const homeCamera = () => home;
-
 /** In the order of the address: what others depend on comes before them. @type {Record<string, Entry>} */
 const ENTRIES = {
   view: radios("view", "mode"),
   also: {
     get: ({ also }) => String(also),
     set(words, draft) {
-      draft.also = named("also").map(({ value }) => value).filter((name) => words.split(",").includes(name));
+      draft.also = named("also")
+        .map(({ value }) => value)
+        .filter((name) => words.split(",").includes(name));
       return true;
     },
   },
@@ -296,7 +289,7 @@ const ENTRIES = {
   seeds: places("seeds"),
   probes: places("probes"),
   camera: {
-    get: ({ camera }) => (camera && !(home && cameraWords(camera) === cameraWords(home)) ? cameraWords(camera) : ""),
+    get: ({ camera }) => (camera && !(page.home && cameraWords(camera) === cameraWords(page.home)) ? cameraWords(camera) : ""),
     set(words, draft) {
       const [x, y, z, distance, yaw, pitch] = numbers(words);
       const isWhole = [x, y, z, distance, yaw, pitch].every(Number.isFinite) && distance > 0;
@@ -328,14 +321,17 @@ const FIRST = {
   camera: undefined,
 };
 
-/** @type {Passing} */
-const PASSING = { playing: false, dark: true, freeze: false, kept: false, split: 50, difference: false };
-
-/** @returns {State} */
-const first = () => /** @type {State} */ ({ ...loaded, ...FIRST, field: fieldNames()[0], vector: vectorNames()[0], box: inner() });
-
 /** The one that the page has. @type {Store<State>} */
-export const store = new Store(/** @type {State} */ ({ ...loaded, ...FIRST, ...PASSING, field: "", vector: "", box: [0, 0, 0, 1, 1, 1] }), settled);
+export const store = new Store(
+  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", vector: "", box: [0, 0, 0, 1, 1, 1], playing: false, dark: true, kept: false }),
+  settled,
+);
+
+/** What there is first of the volume that is open. What is not in the address stays. @returns {State} */
+function first() {
+  const { freeze, difference, split } = store.state;
+  return { ...store.state, ...loaded, ...FIRST, field: fieldNames()[0], vector: vectorNames()[0], box: inner(), freeze, difference, split };
+}
 
 /** What fits the volume, and values that fit each other. @param {State} state @returns {State} */
 function settled(state) {
@@ -386,75 +382,6 @@ export function show({ url, ...given }) {
   const ignored = order.filter((name) => !isTaken(name, given[name]));
   store.replace(draft);
   return ignored.map((name) => `${name}=${given[name]}`);
-}
-
-/** @param {number} low @param {number} high */
-const rangeWords = (low, high) => `${rounded(low, high - low)} to ${rounded(high, high - low)}`;
-
-/** @typedef {[kept: string, lost: string] | undefined} Judgement */
-
-/**
- * What words mean of the volume that has arrived, where that is not all that they say, and what is not there; nothing where all is.
- *
- * @type {Record<string, (words: string, field: string) => Judgement>}
- */
-const LIMITS = {
-  isovalue(words, field) {
-    const [low, high] = rangeOf(field);
-    const isThere = !isNumbers(words, 1) || (Number(words) >= low && Number(words) <= high);
-    return isThere ? undefined : ["", `isovalue ${words} (${field} is ${rangeWords(low, high)})`];
-  },
-  range(words, field) {
-    const [low, high] = rangeOf(field);
-    const [from, to] = numbers(words);
-    return !isNumbers(words, 2) || (to >= low && from <= high) ? undefined : ["", `colours of ${rangeWords(from, to)} (${field} is ${rangeWords(low, high)})`];
-  },
-  box(words) {
-    const { bounds } = volume();
-    const box = numbers(words);
-    const meets = [0, 1, 2].every((i) => box[i] <= bounds[i + 3] && box[i + 3] >= bounds[i]);
-    return !isNumbers(words, 6) || meets ? undefined : ["", "the box of the region"];
-  },
-  seeds: (words) => pointsLeft(words, "seeds"),
-  probes: (words) => pointsLeft(words, "probes"),
-};
-
-/** @param {string} words @param {string} what @returns {Judgement} */
-function pointsLeft(words, what) {
-  const all = points(words);
-  const left = all.filter(isInside);
-  return left.length < all.length ? [String(left.flat()), `${all.length - left.length} ${what} outside`] : undefined;
-}
-
-/** The words of which the volume has something, and what it has not. @param {Words} words @returns {[kept: Words, lost: string[]]} */
-function fitting(words) {
-  const field = fieldNames().includes(words.field) ? words.field : fieldNames()[0];
-  const [kept, lost] = [{ ...words }, /** @type {string[]} */ ([])];
-  for (const [name, judge] of Object.entries(LIMITS)) {
-    const judged = words[name] ? judge(words[name], field) : undefined;
-    if (!judged) continue;
-    kept[name] = judged[0];
-    lost.push(judged[1]);
-  }
-  return [kept, lost];
-}
-
-/** What of some words is not in the state. @param {Words} words */
-function untaken(words) {
-  const { state } = store;
-  const label = (/** @type {string} */ name, /** @type {string} */ value) => named(name).find((one) => one.value === value)?.parentElement?.textContent.trim() ?? value;
-  const lists = /** @type {const} */ ({ field: "field", "surface-colour": "colours of", vector: "vector", time: "time step" });
-  const lost = Object.entries(lists).flatMap(([id, what]) => (words[id] && String(state[/** @type {keyof typeof lists} */ (id)]) !== words[id] ? [`${what} ${words[id]}`] : []));
-  if (words.view !== state.view && named("mode").some(({ value }) => value === words.view)) lost.push(`view ${label("mode", words.view)}`);
-  const also = (words.also ?? "").split(",").filter((name) => named("also").some(({ value }) => value === name) && !state.also.includes(name));
-  return [...lost, ...also.map((name) => `${label("also", name)} beside the view`)];
-}
-
-/** A volume has arrived: takes the words as far as they mean something there. @param {Words} words @returns {{ lost: string[], ignored: string[] }} */
-export function showFitting(words) {
-  const [kept, lost] = fitting(words);
-  const ignored = show(kept);
-  return { lost: [...lost, ...untaken(words)], ignored };
 }
 
 /** Binds the controls that have values of their own. */

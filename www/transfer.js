@@ -137,7 +137,7 @@ export class TransferEditor {
 
   #key(/** @type {KeyboardEvent} */ event) {
     if (event.target === this.#marker) return this.#isovalueKey(event);
-    const i = [...this.#svg.querySelectorAll("circle")].findIndex((circle) => circle === event.target);
+    const i = /** @type {(EventTarget | null)[]} */ ([...this.#svg.querySelectorAll("circle")]).indexOf(event.target);
     if (i < 0) return;
     this.#selected = i;
     const step = STEP[event.shiftKey ? 1 : 0];

@@ -42,7 +42,8 @@ function componentName(count, c) {
 /** How many of the first fields are the components of one vector, named as those of files are; else 1. @param {Field[]} fields */
 function componentsOf(fields) {
   const [{ vector, time }] = fields;
-  const isNext = (/** @type {Field} */ field, /** @type {number} */ c) => vector && field.vector?.name === vector.name && field.vector.component === c && field.time === time;
+  const isNext = (/** @type {Field} */ field, /** @type {number} */ c) =>
+    vector && field.vector?.name === vector.name && field.vector.component === c && field.time === time;
   const end = fields.findIndex((field, c) => !isNext(field, c));
   const count = end < 0 ? fields.length : end;
   const isNamed = (/** @type {Field} */ { name }, /** @type {number} */ c) => name === `${vector?.name}_${componentName(count, c)}`;
@@ -113,7 +114,8 @@ export function vtu({ positions, tets, fields }, shown) {
   const arrays = arraysOf(fields);
   // The one of all fields; several are in their names.
   const time = fields.every((field) => field.time === fields[0].time) ? fields[0]?.time : undefined;
-  const when = time === undefined ? "" : `<FieldData><DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">${time}</DataArray></FieldData>\n`;
+  const when =
+    time === undefined ? "" : `<FieldData><DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">${time}</DataArray></FieldData>\n`;
   const scalars = arrayOf(arrays, shown);
   const ends = Uint32Array.from({ length: cells }, (_, i) => 4 * (i + 1));
   const head = `<?xml version="1.0"?>
@@ -200,9 +202,15 @@ const PLACES = ["x", "y", "z", "nx", "ny", "nz"];
 /** PLY, binary, with normals and the fields at each vertex. @param {Surface} surface @returns {BlobPart[]} */
 export function ply({ positions, normals, fields, indices }) {
   const [points, count] = [positions.length / 3, indices.length / 3];
-  const names = plain(fields.map((field) => nameAtTime(fields, field)), PLACES);
+  const names = plain(
+    fields.map((field) => nameAtTime(fields, field)),
+    PLACES,
+  );
   /** @type {[array: Numbers | undefined, names: string[]][]} */
-  const all = [[positions, PLACES.slice(0, 3)], [normals, PLACES.slice(3)]];
+  const all = [
+    [positions, PLACES.slice(0, 3)],
+    [normals, PLACES.slice(3)],
+  ];
   all.push(...fields.map(({ values }, i) => /** @type {[Numbers, string[]]} */ ([values, [names[i]]])));
   const columns = all.flatMap(([array, names]) => (array ? names.map((label, k) => ({ array, label, k, step: names.length })) : []));
   const width = columns.reduce((sum, { array }) => sum + array.BYTES_PER_ELEMENT, 0);
@@ -228,7 +236,10 @@ export function ply({ positions, normals, fields, indices }) {
 
 /** The smallest and the largest of each coordinate. @param {Float32Array} positions */
 function bounds(positions) {
-  const [min, max] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  const [min, max] = [
+    [Infinity, Infinity, Infinity],
+    [-Infinity, -Infinity, -Infinity],
+  ];
   positions.forEach((x, i) => {
     min[i % 3] = Math.min(min[i % 3], x);
     max[i % 3] = Math.max(max[i % 3], x);
@@ -305,6 +316,7 @@ export function coloursOf(values, { range, log, colours }) {
 
 /** Comma-separated values. Numbers that are missing are empty. @param {(string | number | undefined)[][]} rows @returns {BlobPart[]} */
 export function csv(rows) {
-  const cell = (/** @type {string | number | undefined} */ value) => (typeof value === "string" ? (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value) : (value ?? ""));
+  const cell = (/** @type {string | number | undefined} */ value) =>
+    typeof value === "string" ? (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value) : (value ?? "");
   return [`${rows.map((row) => row.map(cell).join(",")).join("\n")}\n`];
 }

@@ -5,15 +5,25 @@ import { histogramPath, isLogarithmic, percentilesOf, rebinned, SIZE } from "../
 
 /** The heights of the bins, 0 to 1. */
 function heights(volumes) {
-  const places = histogramPath(volumes).replace("Z", "").slice(1).split("L").map((place) => place.split(" ").map(Number));
+  const places = histogramPath(volumes)
+    .replace("Z", "")
+    .slice(1)
+    .split("L")
+    .map((place) => place.split(" ").map(Number));
   const high = SIZE.height - 2 * SIZE.margin;
   // The first place and the last one are at the bottom; each bin has two.
-  return places.slice(1, -1).filter((_, i) => i % 2 === 0).map(([, y]) => 1 - (y - SIZE.margin) / high);
+  return places
+    .slice(1, -1)
+    .filter((_, i) => i % 2 === 0)
+    .map(([, y]) => 1 - (y - SIZE.margin) / high);
 }
 
 test("heights are square roots", () => {
   assert.ok(!isLogarithmic([1, 4, 2, 1]));
-  assert.deepEqual(heights([1, 4, 0]).map((height) => Number(height.toFixed(3))), [0.5, 1, 0]);
+  assert.deepEqual(
+    heights([1, 4, 0]).map((height) => Number(height.toFixed(3))),
+    [0.5, 1, 0],
+  );
 });
 
 test("where one bin is much larger than most, heights are logarithms, and all others are seen", () => {

@@ -48,7 +48,10 @@ test("a chosen file is built in a worker of the page, and opens", async () => {
     const mt = await MultiTessellation.open(bytes);
     const { stats } = await mt.refine({ error: "1%" });
     mt.free();
-    const sent = performance.getEntriesByType("resource").slice(before).map(({ name }) => new URL(name).pathname);
+    const sent = performance
+      .getEntriesByType("resource")
+      .slice(before)
+      .map(({ name }) => new URL(name).pathname);
     return { info, fractions, sha256, report, stats, sent };
   });
   assert.equal(result.sha256, sha256(await readFile(`${folder}/small.mt`)));
@@ -56,7 +59,10 @@ test("a chosen file is built in a worker of the page, and opens", async () => {
   assert.equal(result.info.tetrahedra, result.report.tetrahedra);
   assert.ok(result.fractions.length > 3 && result.fractions.every((f, i, all) => i === 0 || f >= all[i - 1]));
   assert.ok(result.stats.satisfied && result.stats.tetrahedra < result.report.tetrahedra);
-  assert.ok(result.sent.every((path) => path.startsWith("/pkg/")), `nothing but the package is fetched: ${result.sent}`);
+  assert.ok(
+    result.sent.every((path) => path.startsWith("/pkg/")),
+    `nothing but the package is fetched: ${result.sent}`,
+  );
   assert.deepEqual(complaints, []);
 });
 
@@ -65,7 +71,11 @@ test("worker and wasm file are found where the options say, and what is wrong th
   const found = await page.evaluate(async () => {
     const { build } = await import("/pkg/build.js");
     const [file] = document.querySelector("input").files;
-    const outcome = (options) => build(file, options).then(({ bytes }) => bytes.length, ({ code, message }) => `${code}: ${message}`);
+    const outcome = (options) =>
+      build(file, options).then(
+        ({ bytes }) => bytes.length,
+        ({ code, message }) => `${code}: ${message}`,
+      );
     return {
       given: await outcome({ workerUrl: "/pkg/build-worker.js", wasmUrl: "/pkg/tetralod_build_bg.wasm" }),
       page: await outcome({ workerUrl: "/page.html" }),
@@ -86,7 +96,11 @@ test("an MT file of the user is read by slices, as far as it is needed", async (
   const result = await page.evaluate(async () => {
     const { MultiTessellation } = await import("/pkg/index.js");
     const [file] = document.querySelector("input").files;
-    const code = (content, name) => MultiTessellation.open(new File(content, name)).then(() => "opened", (e) => `${e.code}: ${e.message}`);
+    const code = (content, name) =>
+      MultiTessellation.open(new File(content, name)).then(
+        () => "opened",
+        (e) => `${e.code}: ${e.message}`,
+      );
     const read = [];
     for (const worker of [true, false]) {
       const mt = await MultiTessellation.open(file, { worker });
@@ -150,7 +164,11 @@ test("a signal ends the work in the middle", async () => {
 test("broken files and too little memory give typed errors in the page, too", async () => {
   const codes = await page.evaluate(async () => {
     const { build } = await import("/pkg/build.js");
-    const code = (source, options) => build(source, options).then(() => "built", (error) => error.code);
+    const code = (source, options) =>
+      build(source, options).then(
+        () => "built",
+        (error) => error.code,
+      );
     const [file] = document.querySelector("input").files;
     return [
       await code(new File(["hello"], "x.vtu")),
@@ -171,11 +189,9 @@ async function openDemo() {
   demo.on("pageerror", (error) => complaints.push(String(error)));
   await demo.goto(`${server.address}page?url=small.mt`);
   const reach = (tetrahedra) =>
-    demo.waitForFunction(
-      (wanted) => window.tetralodDemo?.state === "complete" && window.tetralodDemo.info?.tetrahedra === wanted,
-      tetrahedra,
-      { timeout: 120_000 },
-    );
+    demo.waitForFunction((wanted) => window.tetralodDemo?.state === "complete" && window.tetralodDemo.info?.tetrahedra === wanted, tetrahedra, {
+      timeout: 120_000,
+    });
   await reach(24_576);
   return { demo, reach, choose: (files) => demo.setInputFiles("#file", files), dialog: demo.locator("dialog.build") };
 }
@@ -235,7 +251,7 @@ test("the demo page repairs a chosen mesh as it is told, and says what it did or
   await level.selectOption("weld");
   await distance.fill("-1");
   await build("Build again");
-  assert.ok(await hasFocus(distance) && (await dialog.locator("progress").isHidden()), "nothing is built with such a distance");
+  assert.ok((await hasFocus(distance)) && (await dialog.locator("progress").isHidden()), "nothing is built with such a distance");
   await distance.fill("1");
   await build("Build again");
   await dialog.locator("[role=alert]").waitFor();

@@ -20,9 +20,7 @@ const cases = JSON.parse(await readFile(`${folder}/builds.json`, "utf8"));
 
 /** The files of a step of a case; raw samples are two. */
 async function input(names) {
-  const steps = names.map(async (name) =>
-    name.endsWith(".raw") ? { raw: await file(name), json: await file(name.replace(".raw", ".json")) } : file(name),
-  );
+  const steps = names.map(async (name) => (name.endsWith(".raw") ? { raw: await file(name), json: await file(name.replace(".raw", ".json")) } : file(name)));
   return steps.length === 1 ? steps[0] : Promise.all(steps);
 }
 
@@ -61,7 +59,11 @@ describe("the bytes are those of the native program", () => {
       const work = phases.find((phase) => ["remove", "collapse", "insert"].includes(phase));
       // A small edge-based MT is collapsed before the first look at its progress.
       assert.deepEqual(phases, ["read", "parse", "repair", work, "order", "encode"].filter(Boolean));
-      if (options.kind !== "edge") assert.ok(seen.some(({ tetrahedra }) => tetrahedra > 0), "tetrahedra are counted");
+      if (options.kind !== "edge")
+        assert.ok(
+          seen.some(({ tetrahedra }) => tetrahedra > 0),
+          "tetrahedra are counted",
+        );
     });
   }
 });
@@ -69,7 +71,10 @@ describe("the bytes are those of the native program", () => {
 test("what was built opens, and meshes of it are within their error", async () => {
   const { bytes, report } = await build(await file("fields.vtu"), { allFields: true });
   const mt = await MultiTessellation.open(bytes);
-  assert.deepEqual(mt.info.fields.map(({ name }) => name), ["pressure", "speed"]);
+  assert.deepEqual(
+    mt.info.fields.map(({ name }) => name),
+    ["pressure", "speed"],
+  );
   assert.equal(mt.info.tetrahedra, report.tetrahedra);
   const { stats } = await mt.refine({ error: "2%", field: "speed" });
   assert.ok(stats.satisfied && stats.relativeErrorBound <= 0.02);
@@ -89,7 +94,8 @@ test("what was repaired, and what was found and kept, is reported", async () => 
 });
 
 test("what was left out of a file is reported", async () => {
-  const text = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 9\n4 0 1 2 3\n3 0 1 2\nCELL_TYPES 2\n10\n5\nPOINT_DATA 4\nSCALARS v float 1\nLOOKUP_TABLE default\n1 2 3 4\n";
+  const text =
+    "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 9\n4 0 1 2 3\n3 0 1 2\nCELL_TYPES 2\n10\n5\nPOINT_DATA 4\nSCALARS v float 1\nLOOKUP_TABLE default\n1 2 3 4\n";
   const { report } = await build(new TextEncoder().encode(text));
   assert.deepEqual(report.notes, ["left out: 1 triangle"]);
   assert.deepEqual((await build(await file("tets.vtk"))).report.notes, []);
@@ -98,7 +104,10 @@ test("what was left out of a file is reported", async () => {
 test("files are inspected before they are built", async () => {
   const grid = await inspect(await file("small.vti"));
   assert.deepEqual([grid.format, grid.dims, grid.points, grid.tetrahedra], ["vti", [17, 17, 17], 17 ** 3, 6 * 16 ** 3]);
-  assert.deepEqual(grid.fields.map(({ name, at }) => [name, at]), [["density", "points"]]);
+  assert.deepEqual(
+    grid.fields.map(({ name, at }) => [name, at]),
+    [["density", "points"]],
+  );
   assert.ok(grid.memory.fits && grid.memory.needed > 1e6 && grid.memory.available > 3e9);
 
   const { format, dims, fields, bounds, tetrahedra } = await inspect(await file("fields.vtu"));
@@ -117,7 +126,12 @@ test("files are inspected before they are built", async () => {
   assert.equal(tets.tetrahedra, 6 * 5 * 4 * 3);
   assert.deepEqual(tets.bounds, [0, 0, 0, 5, 4, 3]);
   const named = tets.fields.map(({ name, at, vector }) => [name, at, vector?.component]);
-  const vector = [["v_x", "points", 0], ["v_y", "points", 1], ["v_z", "points", 2], ["v_magnitude", "points", undefined]];
+  const vector = [
+    ["v_x", "points", 0],
+    ["v_y", "points", 1],
+    ["v_z", "points", 2],
+    ["v_magnitude", "points", undefined],
+  ];
   assert.deepEqual(named, [...vector, ["material", "cells", undefined]]);
 });
 
@@ -221,11 +235,35 @@ describe("broken files give typed errors", () => {
     "cells of 32 bits": [vtu(1, 4294967295), "corrupt", /array "types".*expected 4294967295, found 1/],
     "counts of 64 bits": [vtu("18446744073709551615", 1), "corrupt", /not a count/],
     "more points than there are": [vtu(1000, 1), "corrupt", /array "offsets"/],
-    "polyhedra": [vtk([...one, "CELLS 1 5", "4 0 1 2 3", "CELL_TYPES 1", "42", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]), "unsupported", /polyhedron/],
-    "a point that is not there": [vtk([...one, "CELLS 1 5", "4 0 1 2 9", "CELL_TYPES 1", "10", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]), "corrupt", /point 9/],
+    "polyhedra": [
+      vtk([...one, "CELLS 1 5", "4 0 1 2 3", "CELL_TYPES 1", "42", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]),
+      "unsupported",
+      /polyhedron/,
+    ],
+    "a point that is not there": [
+      vtk([...one, "CELLS 1 5", "4 0 1 2 9", "CELL_TYPES 1", "10", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]),
+      "corrupt",
+      /point 9/,
+    ],
     "points that wrap around": [vtk(["DATASET UNSTRUCTURED_GRID", "POINTS 1431655766 float", "0 0 0"]), "truncated", /POINTS/],
     "cells that wrap around": [vtk([...one, "CELLS 858993460 4294967300", "4 0 1 2 3"]), "corrupt", /not a count/],
-    "a flat mesh": [vtk(["DATASET UNSTRUCTURED_GRID", "POINTS 4 float", "0 0 0 1 0 0 0 1 0 1 1 0", "CELLS 1 5", "4 0 1 2 3", "CELL_TYPES 1", "10", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]), "bad-mesh", /tetrahedr/],
+    "a flat mesh": [
+      vtk([
+        "DATASET UNSTRUCTURED_GRID",
+        "POINTS 4 float",
+        "0 0 0 1 0 0 0 1 0 1 1 0",
+        "CELLS 1 5",
+        "4 0 1 2 3",
+        "CELL_TYPES 1",
+        "10",
+        "POINT_DATA 4",
+        "SCALARS f float",
+        "LOOKUP_TABLE default",
+        "1 2 3 4",
+      ]),
+      "bad-mesh",
+      /tetrahedr/,
+    ],
     "no field": [vtk([...one, "CELLS 1 5", "4 0 1 2 3", "CELL_TYPES 1", "10"]), "bad-mesh", /point field/],
     "no cells": [vtk([...one, "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4", "CELLS 0 0", "CELL_TYPES 0"]), "bad-mesh", /insert/],
   };
@@ -305,7 +343,10 @@ test("a module that gets no more memory ends with a typed error", async () => {
 
 test("the example of the package's README does what its text says", async () => {
   const page = await readFile(new URL("../../pkg-template/README.md", import.meta.url), "utf8");
-  const code = page.split("```js\n").map((block) => block.split("```")[0]).find((block) => block.startsWith("import { build, inspect }"));
+  const code = page
+    .split("```js\n")
+    .map((block) => block.split("```")[0])
+    .find((block) => block.startsWith("import { build, inspect }"));
   assert.ok(code, "there is an example");
   const project = await mkdtemp(join(tmpdir(), "tetralod-build-"));
   try {

@@ -39,7 +39,11 @@ for (const [name, hashes] of Object.entries(FILES)) {
   test(`${name} gives the meshes of native code`, async () => {
     const cases = JSON.parse(await readFile(`${folder}/${hashes}`, "utf8"));
     assert.ok(cases.length > 2, "some requests");
-    for (const [module, worker] of [["tetralod", true], ["tetralod", false], ["tetralod/inline", true]]) {
+    for (const [module, worker] of [
+      ["tetralod", true],
+      ["tetralod", false],
+      ["tetralod/inline", true],
+    ]) {
       const run = async ({ module, worker, name, requests }) => {
         const { MultiTessellation } = await import(module);
         const mt = await MultiTessellation.open(`/${name}`, { worker });
@@ -53,7 +57,11 @@ for (const [name, hashes] of Object.entries(FILES)) {
         return { found, points: positions.length };
       };
       const { found, points } = await page.evaluate(run, { module, worker, name, requests: cases.map(({ options }) => options) });
-      assert.deepEqual(found, cases.map(({ hash }) => hash), `${module}, ${worker ? "in a worker" : "in the page"}`);
+      assert.deepEqual(
+        found,
+        cases.map(({ hash }) => hash),
+        `${module}, ${worker ? "in a worker" : "in the page"}`,
+      );
       assert.ok(points > 0, "an isosurface");
     }
   });
@@ -82,7 +90,10 @@ test("what was ended is refused by name", async () => {
   const code = await page.evaluate(async () => {
     const { MultiTessellation } = await import("tetralod");
     const mt = await MultiTessellation.open("/small.mt");
-    const refined = mt.refine({ error: 0 }).then(() => "none", (error) => error.code);
+    const refined = mt.refine({ error: 0 }).then(
+      () => "none",
+      (error) => error.code,
+    );
     mt.free();
     return refined;
   });
@@ -93,7 +104,13 @@ test("a browser without WebGPU says so", async () => {
   const found = await page.evaluate(async () => {
     const { Viewer } = await import("tetralod/viewer");
     const adapter = await navigator.gpu?.requestAdapter();
-    return { gpu: Boolean(adapter), answer: await Viewer.check().then(() => "drawn", (error) => `${error.code}: ${error.message}`) };
+    return {
+      gpu: Boolean(adapter),
+      answer: await Viewer.check().then(
+        () => "drawn",
+        (error) => `${error.code}: ${error.message}`,
+      ),
+    };
   });
   if (found.gpu) assert.equal(found.answer, "drawn");
   else assert.match(found.answer, /^no-webgpu: .*(WebGPU|adapter)/);

@@ -262,9 +262,12 @@ test("the configuration of nginx does what the page says", async () => {
   const server = code.replace("listen 8080", `listen 127.0.0.1:${port}`).replace("root /var/www/tetralod", `root ${folder}`);
   const paths = ["client_body", "proxy", "fastcgi", "uwsgi", "scgi"].map((name) => `${name}_temp_path ${folder}/temp;`).join("\n");
   const types = "types { text/html html; text/javascript js; application/wasm wasm; }\ndefault_type application/octet-stream;";
-  await writeFile(join(folder, "nginx.conf"), `
+  await writeFile(
+    join(folder, "nginx.conf"),
+    `
     daemon off; pid ${folder}/pid; error_log stderr; events {}
-    http { access_log off; ${paths}\n${types}\n${server} }`);
+    http { access_log off; ${paths}\n${types}\n${server} }`,
+  );
   const bytes = new Uint8Array(5000);
   await writeFile(join(folder, "a.mt"), bytes);
   await writeFile(join(folder, "a.wasm"), bytes);

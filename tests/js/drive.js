@@ -98,7 +98,10 @@ export async function settle(page) {
     await page.evaluate((patience) => window.tetralodDemo.viewer?.settled({ signal: AbortSignal.timeout(patience) }).catch(() => {}), PATIENCE);
     const [frames, step] = [await demo(page, "frames"), await demo(page, "step")];
     if (frames === seen && step?.done !== false) return;
-    assert.ok(performance.now() - start < 2 * PATIENCE, `no rest: ${frames} frames, ${frames - seen} of them just now, ${JSON.stringify(step)} ${page.complaints}`);
+    assert.ok(
+      performance.now() - start < 2 * PATIENCE,
+      `no rest: ${frames} frames, ${frames - seen} of them just now, ${JSON.stringify(step)} ${page.complaints}`,
+    );
     seen = frames;
     await page.waitForTimeout(400);
   }
@@ -108,13 +111,15 @@ export async function settle(page) {
 export const show = (page, view) => page.locator("label", { hasText: view }).first().click();
 
 /** Waits until the address has what a pattern matches. */
-export const addressed = (page, pattern) =>
-  page.waitForFunction((source) => new RegExp(source).test(location.hash), pattern.source, { timeout: PATIENCE });
+export const addressed = (page, pattern) => page.waitForFunction((source) => new RegExp(source).test(location.hash), pattern.source, { timeout: PATIENCE });
 
 /** Drops a file on the page, as a person drags it there from a folder. */
 export const drop = (page, name, text) =>
-  page.evaluate(([name, text]) => {
-    const dataTransfer = new DataTransfer();
-    dataTransfer.items.add(new File([text], name));
-    for (const type of ["dragenter", "dragover", "drop"]) window.dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
-  }, [name, text]);
+  page.evaluate(
+    ([name, text]) => {
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File([text], name));
+      for (const type of ["dragenter", "dragover", "drop"]) window.dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
+    },
+    [name, text],
+  );

@@ -16,17 +16,36 @@ function gridFile(n) {
   const points = range((n + 1) ** 3).map((i) => [i % (n + 1), Math.floor(i / (n + 1)) % (n + 1), Math.floor(i / (n + 1) ** 2)]);
   const at = ([x, y, z]) => x + (n + 1) * (y + (n + 1) * z);
   // From the lowest corner of a cube to the highest, along its axes in each order.
-  const orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
-  const cells = points.filter((p) => p.every((x) => x < n)).flatMap((corner) => orders.map((order) => {
-    const path = [corner];
-    for (const axis of order) path.push(path[path.length - 1].map((x, i) => (i === axis ? x + 1 : x)));
-    return path.map(at);
-  }));
+  const orders = [
+    [0, 1, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [0, 2, 1],
+    [2, 1, 0],
+    [1, 0, 2],
+  ];
+  const cells = points
+    .filter((p) => p.every((x) => x < n))
+    .flatMap((corner) =>
+      orders.map((order) => {
+        const path = [corner];
+        for (const axis of order) path.push(path[path.length - 1].map((x, i) => (i === axis ? x + 1 : x)));
+        return path.map(at);
+      }),
+    );
   const values = points.map((p) => Math.hypot(...p.map((x) => x / n - 0.5)));
   const array = (type, name, numbers, more = "") => `<DataArray type="${type}" Name="${name}" ${more} format="ascii">${numbers.flat().join(" ")}</DataArray>`;
   return `<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid><Piece NumberOfPoints="${points.length}" NumberOfCells="${cells.length}">
 <PointData>${array("Float64", "distance", values)}</PointData><Points>${array("Float64", "Points", points, 'NumberOfComponents="3"')}</Points>
-<Cells>${array("Int64", "connectivity", cells)}${array("Int64", "offsets", cells.map((_, i) => 4 * (i + 1)))}${array("UInt8", "types", cells.map(() => 10))}</Cells>
+<Cells>${array("Int64", "connectivity", cells)}${array(
+    "Int64",
+    "offsets",
+    cells.map((_, i) => 4 * (i + 1)),
+  )}${array(
+    "UInt8",
+    "types",
+    cells.map(() => 10),
+  )}</Cells>
 </Piece></UnstructuredGrid></VTKFile>`;
 }
 

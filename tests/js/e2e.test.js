@@ -4,7 +4,27 @@ import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { address } from "./browser.js";
-import { addressed, assertDrawn, assertLike, begin, demo, differing, distance, end, newPage, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still, study } from "./drive.js";
+import {
+  addressed,
+  assertDrawn,
+  assertLike,
+  begin,
+  demo,
+  differing,
+  distance,
+  end,
+  newPage,
+  open,
+  PATIENCE,
+  picture,
+  pictures,
+  reach,
+  setSlider,
+  settle,
+  show,
+  still,
+  study,
+} from "./drive.js";
 
 before(() => begin(0.6));
 
@@ -285,7 +305,10 @@ async function middle(page) {
 /** The boxes of elements on the screen. */
 const boxes = (page, selector) =>
   page.locator(selector).evaluateAll((found) =>
-    found.map((one) => one.getBoundingClientRect()).filter(({ width }) => width > 0).map(({ left, top, right, bottom }) => ({ left, top, right, bottom })),
+    found
+      .map((one) => one.getBoundingClientRect())
+      .filter(({ width }) => width > 0)
+      .map(({ left, top, right, bottom }) => ({ left, top, right, bottom })),
   );
 
 /** That no label lies over another one or over the legend; how high the name of an axis is. */
@@ -564,11 +587,7 @@ test("the eye flies, and rotations run out unless less motion is asked for", asy
   await page.locator("#canvas").focus();
   const start = await camera();
   await page.keyboard.down("w");
-  await page.waitForFunction(
-    (target) => window.tetralodDemo.viewer.state.camera.target.some((x, i) => x !== target[i]),
-    start.target,
-    { timeout: PATIENCE },
-  );
+  await page.waitForFunction((target) => window.tetralodDemo.viewer.state.camera.target.some((x, i) => x !== target[i]), start.target, { timeout: PATIENCE });
   await page.keyboard.up("w");
   assert.deepEqual(page.complaints, []);
   await page.close();
@@ -638,7 +657,10 @@ test("the package runs in a worker of the page, without a viewer", async () => {
     const mesh = await mt.refine({ error: "100%" });
     let followed = true;
     for (let i = 0; i < 12; i++) {
-      const [lower, upper] = [[0.1 + 0.05 * i, 0.2, 0.2], [0.3 + 0.05 * i, 0.5, 0.5]];
+      const [lower, upper] = [
+        [0.1 + 0.05 * i, 0.2, 0.2],
+        [0.3 + 0.05 * i, 0.5, 0.5],
+      ];
       const options = { error: "0.5%", box: [...at(lower), ...at(upper)] };
       const updates = 200 + 500 * i;
       for await (const step of mt.refineSteps(options, { deltas: true, updates })) applyChanges(mesh, step);

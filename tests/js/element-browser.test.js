@@ -27,13 +27,16 @@ const bodies = {};
 before(async () => {
   await mkdir(pictures, { recursive: true });
   // The policy of the README: all of the element works under it.
-  server = await servePackage(({ url }, response) => {
-    if (url === "/model.mt" || url === "/bucky.mt") return response.end(file);
-    if (url === "/fields.mt") return response.end(fields);
-    if (url === "/element.css") return response.setHeader("content-type", "text/css").end();
-    if (bodies[url]) return response.setHeader("content-type", "text/html").end(page(bodies[url]));
-    return response.writeHead(404).end();
-  }, { "content-security-policy": policy });
+  server = await servePackage(
+    ({ url }, response) => {
+      if (url === "/model.mt" || url === "/bucky.mt") return response.end(file);
+      if (url === "/fields.mt") return response.end(fields);
+      if (url === "/element.css") return response.setHeader("content-type", "text/css").end();
+      if (bodies[url]) return response.setHeader("content-type", "text/html").end(page(bodies[url]));
+      return response.writeHead(404).end();
+    },
+    { "content-security-policy": policy },
+  );
   browser = await launch();
 });
 
@@ -57,22 +60,30 @@ async function opened(body, { prepare = undefined, complains = /^$/ } = {}) {
 }
 
 const reach = (page, status) =>
-  page.waitForFunction((status) => document.querySelector("tetralod-viewer").status === status, status, { timeout: 60_000 })
-    .catch(async () => assert.fail(`not ${status}: ${await page.evaluate(() => {
-      const { status, failure } = document.querySelector("tetralod-viewer");
-      return `${status} ${failure?.message}`;
-    })}`));
+  page
+    .waitForFunction((status) => document.querySelector("tetralod-viewer").status === status, status, { timeout: 60_000 })
+    .catch(async () =>
+      assert.fail(
+        `not ${status}: ${await page.evaluate(() => {
+          const { status, failure } = document.querySelector("tetralod-viewer");
+          return `${status} ${failure?.message}`;
+        })}`,
+      ),
+    );
 
 /** The picture at rest: none is drawn any more. */
 async function picture(page, name) {
-  await page.evaluate(() => new Promise((resolve) => {
-    const element = document.querySelector("tetralod-viewer");
-    let timer = setTimeout(resolve, 700);
-    element.addEventListener("frame", () => {
-      clearTimeout(timer);
-      timer = setTimeout(resolve, 700);
-    });
-  }));
+  await page.evaluate(
+    () =>
+      new Promise((resolve) => {
+        const element = document.querySelector("tetralod-viewer");
+        let timer = setTimeout(resolve, 700);
+        element.addEventListener("frame", () => {
+          clearTimeout(timer);
+          timer = setTimeout(resolve, 700);
+        });
+      }),
+  );
   const path = fileURLToPath(new URL(`element-${name}.png`, pictures));
   return study(page, await page.locator("tetralod-viewer").screenshot({ path }));
 }
@@ -112,7 +123,7 @@ test("pointer, wheel and keys move it; scrolling past it does not", async () => 
   let last = await camera();
   const moves = async (what, act, ...names) => {
     await act();
-    const changed = () => names.length === 0 ? true : names.some((name) => JSON.stringify(now[name]) !== JSON.stringify(last[name]));
+    const changed = () => (names.length === 0 ? true : names.some((name) => JSON.stringify(now[name]) !== JSON.stringify(last[name])));
     let now = last;
     for (let i = 0; i < 100 && !changed(); i++) {
       await page.waitForTimeout(30);
@@ -126,11 +137,16 @@ test("pointer, wheel and keys move it; scrolling past it does not", async () => 
   await wheel();
   await page.waitForTimeout(200);
   assert.deepEqual(await camera(), last, "without focus the wheel is the page's");
-  await moves("drag", async () => {
-    await page.mouse.down();
-    await page.mouse.move(220, 130, { steps: 4 });
-    await page.mouse.up();
-  }, "yaw", "pitch");
+  await moves(
+    "drag",
+    async () => {
+      await page.mouse.down();
+      await page.mouse.move(220, 130, { steps: 4 });
+      await page.mouse.up();
+    },
+    "yaw",
+    "pitch",
+  );
   await moves("wheel with focus", wheel, "distance");
   await moves("arrow", () => page.keyboard.press("ArrowLeft"), "yaw");
   await moves("arrow with Shift", () => page.keyboard.press("Shift+ArrowLeft"), "target");
@@ -178,7 +194,12 @@ test("errors are events, name what is wrong, and go when it is right again", asy
   const set = (name, value) => page.evaluate(([name, value]) => document.querySelector("tetralod-viewer").setAttribute(name, value), [name, value]);
   await set("src", "fields.mt");
   await reach(page, "ready");
-  for (const [name, bad, good] of [["mode", "cloud", "volume"], ["isovalue", "high", "0.5"], ["error", "much", "1%"], ["map", "mud", "turbo"]]) {
+  for (const [name, bad, good] of [
+    ["mode", "cloud", "volume"],
+    ["isovalue", "high", "0.5"],
+    ["error", "much", "1%"],
+    ["map", "mud", "turbo"],
+  ]) {
     await set(name, bad);
     await reach(page, "failed");
     assert.match(await message.textContent(), new RegExp(`${name}|${bad}`));

@@ -204,10 +204,16 @@ const MT = `import { MultiTessellation } from "tetralod";
   await mt.complete;`;
 
 for (const [entry, prelude, ending] of [
-  ["three", `import * as THREE from "three"; ${MT} const scene = new THREE.Scene();`,
-    "console.log(scene.children.length === 2 && scene.children.every(({ geometry }) => geometry.drawRange.count > 100));"],
-  ["vtk", `import vtkMapper from "@kitware/vtk.js/Rendering/Core/Mapper.js"; ${MT} const mapper = vtkMapper.newInstance();`,
-    "console.log(mapper.getInputData().getNumberOfPolys() > 10);"],
+  [
+    "three",
+    `import * as THREE from "three"; ${MT} const scene = new THREE.Scene();`,
+    "console.log(scene.children.length === 2 && scene.children.every(({ geometry }) => geometry.drawRange.count > 100));",
+  ],
+  [
+    "vtk",
+    `import vtkMapper from "@kitware/vtk.js/Rendering/Core/Mapper.js"; ${MT} const mapper = vtkMapper.newInstance();`,
+    "console.log(mapper.getInputData().getNumberOfPolys() > 10);",
+  ],
   ["inline", OPEN, "await mt.complete; console.log((await mt.refine({ error: '1%' })).stats.satisfied);"],
 ]) {
   test(`${entry}: the example of the README runs`, async () => {

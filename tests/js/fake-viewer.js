@@ -7,7 +7,14 @@ const FIELDS = [0, 1, 2].flatMap((time) => [
 
 const VOLUMES = {
   flow: { kind: "half-edge", vertices: 1000, tetrahedra: 5000, updates: 900, bounds: [0, 0, 0, 2, 4, 8], fields: FIELDS },
-  plain: { kind: "explicit", vertices: 300, tetrahedra: 1000, updates: 200, bounds: [-1, -1, -1, 1, 1, 1], fields: [{ name: "density", unit: "", min: -2, max: 6, time: undefined }] },
+  plain: {
+    kind: "explicit",
+    vertices: 300,
+    tetrahedra: 1000,
+    updates: 200,
+    bounds: [-1, -1, -1, 1, 1, 1],
+    fields: [{ name: "density", unit: "", min: -2, max: 6, time: undefined }],
+  },
 };
 
 const HOME = { target: [1, 2, 4], distance: 20, yaw: -0.75, pitch: 0.12, projection: "perspective" };
@@ -16,7 +23,11 @@ const HOME = { target: [1, 2, 4], distance: 20, yaw: -0.75, pitch: 0.12, project
 const OVERLAY = {
   axes: [],
   scaleBar: { label: "1 m", length: 1, width: 0.1, everywhere: true },
-  rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  rotation: [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ],
   matrix: [1, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0, 0, -1, -1, 0, 1],
 };
 
@@ -56,7 +67,19 @@ export class Viewer extends EventTarget {
 
   async refine(request) {
     this.requests.push(request);
-    this.#tell("stats", { tetrahedra: 500, vertices: 100, applied: 50, refined: 5, coarsened: 0, milliseconds: 1, done: true, satisfied: true, relativeErrorBound: 0.01, bounds: [0.01], bytes: 1000 });
+    this.#tell("stats", {
+      tetrahedra: 500,
+      vertices: 100,
+      applied: 50,
+      refined: 5,
+      coarsened: 0,
+      milliseconds: 1,
+      done: true,
+      satisfied: true,
+      relativeErrorBound: 0.01,
+      bounds: [0.01],
+      bytes: 1000,
+    });
   }
 
   async set(changes) {

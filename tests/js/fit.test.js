@@ -4,7 +4,11 @@ import { test } from "node:test";
 import { changedScene, checkFields, fitScene } from "../../pkg/fit.js";
 
 const volume = {
-  fields: [{ name: "p", min: -1, max: 1 }, { name: "u", min: 0, max: 4 }, { name: "u", min: 2, max: 6 }],
+  fields: [
+    { name: "p", min: -1, max: 1 },
+    { name: "u", min: 0, max: 4 },
+    { name: "u", min: 2, max: 6 },
+  ],
   bounds: [0, 0, 0, 1, 1, 2],
 };
 
@@ -14,7 +18,13 @@ test("what fits stays as it is", () => {
   const scene = {
     isosurfaces: [{ value: 0.5, field: "u" }, { value: 5.5 }, {}],
     slices: [{ normal: [0, 0, 2], offset: 2, field: "p" }],
-    volume: { opacities: [[-3, 0], [0, 0.5]], unitLength: 0.1 },
+    volume: {
+      opacities: [
+        [-3, 0],
+        [0, 0.5],
+      ],
+      unitLength: 0.1,
+    },
     clips: [{ normal: [1, 0, 0], offset: 7 }],
     clipBox: [0.5, 0.5, 0.5, 9, 9, 9],
     streamlines: { fields: ["u", "u", "p"], seeds: [[0.5, 0.5, 1.5]], field: "p", radius: 0.01 },
@@ -30,7 +40,10 @@ test("fields that the volume does not have go, with what needs them", () => {
   const flow = { fields: ["vx", "vy", "vz"], seeds: [[0, 0, 0]] };
   const { scene, dropped } = fitScene({ slices: [{ normal: [0, 0, 1], offset: 1, field: "T" }], streamlines: flow, arrows: { fields: flow.fields } }, volume);
   assert.deepEqual(scene, { slices: [{ normal: [0, 0, 1], offset: 1 }] });
-  assert.deepEqual(dropped.map(({ part }) => part), ["slices[0].field", "streamlines", "arrows"]);
+  assert.deepEqual(
+    dropped.map(({ part }) => part),
+    ["slices[0].field", "streamlines", "arrows"],
+  );
   assert.equal(dropped[1].problem, 'there is no field "vx"; this volume has: p, u');
   const coloured = fitScene({ isosurfaces: [{ value: 0, field: "T" }], streamlines: { ...flow, fields: ["u", "u", "u"], field: "T" } }, volume);
   assert.deepEqual(coloured.scene.isosurfaces, [{ value: 0 }]);
@@ -39,14 +52,45 @@ test("fields that the volume does not have go, with what needs them", () => {
 
 test("values, planes, boxes, points and lengths of another volume go", () => {
   assert.deepEqual(parts({ isosurfaces: [{ value: 300 }, { value: 3 }] }), ["isosurfaces[0].value"]);
-  assert.deepEqual(parts({ volume: { opacities: [[300, 0], [400, 1]], unitLength: 1e9 } }), ["volume.opacities", "volume.unitLength"]);
+  assert.deepEqual(
+    parts({
+      volume: {
+        opacities: [
+          [300, 0],
+          [400, 1],
+        ],
+        unitLength: 1e9,
+      },
+    }),
+    ["volume.opacities", "volume.unitLength"],
+  );
   assert.deepEqual(parts({ volume: { points: [[300, 0, 0, 0, 1]] } }), ["volume.points"]);
   assert.deepEqual(parts({ isosurfaces: [{}], colours: { range: [300, 400], map: "grey" } }), ["colours.range"]);
-  assert.deepEqual(parts({ slices: [{ normal: [0, 0, 1], offset: 3 }, { normal: [1, 1, 0], offset: 1.9 }] }), ["slices[0]"]);
-  assert.deepEqual(parts({ boundary: {}, clips: [{ normal: [1, 0, 0], offset: -1 }, { normal: [-1, 0, 0], offset: 0 }] }), ["clips[0]"]);
+  assert.deepEqual(
+    parts({
+      slices: [
+        { normal: [0, 0, 1], offset: 3 },
+        { normal: [1, 1, 0], offset: 1.9 },
+      ],
+    }),
+    ["slices[0]"],
+  );
+  assert.deepEqual(
+    parts({
+      boundary: {},
+      clips: [
+        { normal: [1, 0, 0], offset: -1 },
+        { normal: [-1, 0, 0], offset: 0 },
+      ],
+    }),
+    ["clips[0]"],
+  );
   assert.deepEqual(parts({ cells: { cut: { normal: [0, 0, -1], offset: -5 } } }), ["cells.cut"]);
   assert.deepEqual(parts({ boundary: {}, clipBox: [5, 5, 5, 6, 6, 6], region: [0, 0, 3, 1, 1, 4] }), ["clipBox", "region"]);
-  const seeds = [[0, 0, 0], [0, 0, 9]];
+  const seeds = [
+    [0, 0, 0],
+    [0, 0, 9],
+  ];
   assert.deepEqual(fitScene({ streamlines: { fields: ["u", "u", "u"], seeds } }, volume).scene.streamlines.seeds, [[0, 0, 0]]);
 });
 
@@ -63,7 +107,8 @@ test("changes that name a field which is not there are refused", () => {
     { slices: [{ normal: [0, 0, 1], offset: 0, field: "T" }] },
     { streamlines: { fields: ["u", "u", "T"], seeds: [] } },
     { arrows: { fields: ["u", "u", "u"], field: "T" } },
-  ]) assert.throws(named(scene), { code: "bad-option", message: /there is no field "T"; this volume has: p, u$/ });
+  ])
+    assert.throws(named(scene), { code: "bad-option", message: /there is no field "T"; this volume has: p, u$/ });
   named({ isosurfaces: [{ field: "u" }, { field: null }], arrows: null })();
   assert.deepEqual(changedScene({ volume: {}, slices: [] }, { volume: null, cells: {} }), { slices: [], cells: {} });
 });

@@ -16,11 +16,17 @@ test("one call is under way, one waits, and the last one wins", async () => {
   const { calls, run } = byHand();
   const latest = new Latest(run);
   const answers = [1, 2, 3, 4].map((value) => latest.call(value));
-  assert.deepEqual(calls.map((call) => call.value), [1]);
+  assert.deepEqual(
+    calls.map((call) => call.value),
+    [1],
+  );
   calls[0].resolve("one");
   assert.equal(await answers[0], "one");
   await soon();
-  assert.deepEqual(calls.map((call) => call.value), [1, 4]);
+  assert.deepEqual(
+    calls.map((call) => call.value),
+    [1, 4],
+  );
   calls[1].resolve("four");
   assert.deepEqual(await Promise.all(answers.slice(1)), ["four", "four", "four"]);
   const later = latest.call(5);
@@ -57,7 +63,10 @@ test("it is idle when nothing runs and nothing waits", async () => {
 });
 
 test("movements that wait add up, changes of the scene stay apart; of everything else the later one counts", () => {
-  const sets = [{ id: 0, changes: { volume: {} } }, { id: 1, changes: { slices: [] } }];
+  const sets = [
+    { id: 0, changes: { volume: {} } },
+    { id: 1, changes: { slices: [] } },
+  ];
   const a = { orbit: [1, 2], zoom: [2, 0, 0], sets: sets.slice(0, 1), size: [4, 5, 1] };
   const b = { orbit: [10, 20], pan: [5, 6], zoom: [0.25, 0.1, 0.2], sets: sets.slice(1) };
   assert.deepEqual(mergeUpdates(a, b), {

@@ -60,7 +60,10 @@ test("a circle is found, and what is none is not", () => {
   assert.equal(circle('import { x } from "./b.js";', 'export { y } from "./c.js";', 'import {\n  z,\n} from "./a.js";'), "a b c a");
   assert.equal(circle('import "./a.js";'), "a a");
   assert.equal(circle('import { x } from "./b.js";\nimport { y } from "./c.js";', 'import { y } from "./c.js";', 'import fs from "node:fs";'), undefined);
-  assert.equal(circle('import { x } from "./b.js";', 'export const a = () => new URL("./a.js", import.meta.url);\nconst b = await import("./a.js");'), undefined);
+  assert.equal(
+    circle('import { x } from "./b.js";', 'export const a = () => new URL("./a.js", import.meta.url);\nconst b = await import("./a.js");'),
+    undefined,
+  );
   assert.equal(circle('import { x } from "./b.js";', 'import type { X } from "./a.js";\n/** @typedef {import("./a.js").X} X */'), undefined);
   assert.equal(circleIn(graphOf({ "in/a.ts": 'import { b } from "../b.js";', "b.ts": 'import { a } from "./in/a.js";' }))?.join(" "), "in/a b in/a");
 });

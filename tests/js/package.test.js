@@ -193,7 +193,11 @@ for (const worker of [true, false]) {
       const stats = await mt.stats({ bins: 16 });
       near(stats.volume, dx * dy * dz, 1e-6);
       near(stats.mean * stats.volume, stats.integral, 1e-9);
-      near([...stats.histogram, stats.below, stats.above].reduce((a, b) => a + b), stats.volume, 1e-9);
+      near(
+        [...stats.histogram, stats.below, stats.above].reduce((a, b) => a + b),
+        stats.volume,
+        1e-9,
+      );
       assert.equal(stats.edges.length, 17);
 
       const { name } = mt.info.fields[0];
@@ -231,7 +235,10 @@ for (const worker of [true, false]) {
       const mesh = await mt.refine(request, { fields: true });
       const all = mt.info.fields;
       assert.ok(all.length > 1);
-      assert.deepEqual(mesh.fields.map(({ values, ...field }) => field), all.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale })));
+      assert.deepEqual(
+        mesh.fields.map(({ values, ...field }) => field),
+        all.map(({ name, unit, time, vector, offset, scale }, index) => ({ index, name, unit, time, vector, offset, scale })),
+      );
       assert.deepEqual(mesh.fields[1].values, mesh.field);
       for (const { index, values } of mesh.fields) {
         assert.deepEqual(values, (await mt.refine({ needs, field: index })).field);
@@ -242,11 +249,22 @@ for (const worker of [true, false]) {
       const { min, max } = all[1];
       const how = { fields: [1, all[0].name] };
       const slice = await mt.slice([1, 0.2, 0.1], x0 + 0.3 * (x1 - x0) + 0.2 * y0 + 0.1 * z0, how);
-      const surfaces = { slice, isosurface: await mt.isosurface([0.3, 0.6].map((part) => min + part * (max - min)), how), boundary: await mt.surface(how) };
+      const surfaces = {
+        slice,
+        isosurface: await mt.isosurface(
+          [0.3, 0.6].map((part) => min + part * (max - min)),
+          how,
+        ),
+        boundary: await mt.surface(how),
+      };
       for (const [name, surface] of Object.entries(surfaces)) {
         const { positions, values, fields } = absolute(surface);
         assert.ok(values.length > 50, name);
-        assert.deepEqual(fields.map(({ index }) => index), [1, 0], name);
+        assert.deepEqual(
+          fields.map(({ index }) => index),
+          [1, 0],
+          name,
+        );
         for (const field of fields) {
           await mt.setField(field.index);
           const probed = await mt.probe(positions);
@@ -256,7 +274,10 @@ for (const worker of [true, false]) {
           assert.ok(inside.length > 0.9 * values.length, `${name}: ${inside.length} of ${values.length}`);
           for (const i of inside) assert.ok(Math.abs(field.values[i] - probed[i]) < near, `${name}: ${field.values[i]}, ${probed[i]}`);
         }
-        assert.ok(values.every((value, i) => Math.abs(value - fields[0].values[i]) < 1e-6 * (max - min)), name);
+        assert.ok(
+          values.every((value, i) => Math.abs(value - fields[0].values[i]) < 1e-6 * (max - min)),
+          name,
+        );
         await mt.setField(1);
       }
 
@@ -343,7 +364,15 @@ for (const worker of [true, false]) {
       const named = new File(["no mesh at all"], "dropped.mt");
       await rejects(open(named), "not-mt", /^dropped\.mt: /);
       await rejects(open(null), "bad-source");
-      await rejects(open((async function* () { yield "text"; })()), "bad-source", /string/);
+      await rejects(
+        open(
+          (async function* () {
+            yield "text";
+          })(),
+        ),
+        "bad-source",
+        /string/,
+      );
       const used = await fetch(`${base}/good`);
       await used.arrayBuffer();
       await rejects(open(used), "bad-source");
@@ -399,7 +428,12 @@ for (const worker of [true, false]) {
       await until(() => held.size === 0, "the connection is closed");
 
       const waiting = new AbortController();
-      const never = open((async function* () { await new Promise(() => {}); })(), { signal: waiting.signal });
+      const never = open(
+        (async function* () {
+          await new Promise(() => {});
+        })(),
+        { signal: waiting.signal },
+      );
       waiting.abort(new Error("changed my mind"));
       await assert.rejects(never, /changed my mind/);
     });

@@ -4,7 +4,24 @@ import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { addressed, assertDrawn, begin, demo, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still } from "./drive.js";
+import {
+  addressed,
+  assertDrawn,
+  begin,
+  demo,
+  differing,
+  drop,
+  end,
+  open,
+  PATIENCE,
+  picture,
+  pictures,
+  reach,
+  setSlider,
+  settle,
+  show,
+  still,
+} from "./drive.js";
 
 before(() => begin());
 
@@ -44,7 +61,11 @@ async function press(page, key) {
 test("all is reached with keys, and the list of keys has them", async () => {
   const page = await open(SMALL, undefined, VIEWPORT);
   await reach(page, "complete");
-  for (const [key, view] of [["3", "slice"], ["5", "mesh"], ["1", "iso"]]) {
+  for (const [key, view] of [
+    ["3", "slice"],
+    ["5", "mesh"],
+    ["1", "iso"],
+  ]) {
     await press(page, key);
     assert.equal(await page.locator("[name=mode]:checked").getAttribute("value"), view);
   }
@@ -249,9 +270,11 @@ test("a phone shows the picture while a control is moved, and keeps the state wh
   };
   assert.ok(await seen(), "picture and control at once");
   const wide = () =>
-    page.evaluate(() => [document.documentElement, ...document.querySelectorAll(".panel:not([hidden]), header, .tools button, .tabs button, .segments span")]
-      .filter(({ scrollWidth, clientWidth }) => scrollWidth > clientWidth + 1)
-      .map(({ outerHTML }) => outerHTML.slice(0, 80)));
+    page.evaluate(() =>
+      [document.documentElement, ...document.querySelectorAll(".panel:not([hidden]), header, .tools button, .tabs button, .segments span")]
+        .filter(({ scrollWidth, clientWidth }) => scrollWidth > clientWidth + 1)
+        .map(({ outerHTML }) => outerHTML.slice(0, 80)),
+    );
   assert.deepEqual(await wide(), [], "nothing is cut");
   for (const tab of ["data", "export", "settings"]) {
     await page.tap(`#tab-${tab}`);
@@ -336,13 +359,15 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
     await page.setChecked("#shot-overlay", isOverlaid);
     const { name, bytes } = await save("#shot");
     assert.match(name, /^bucky-small-\d+x\d+\.png$/);
-    sizes.push(await page.evaluate(async (base64) => {
-      const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-      const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-      const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
-      context.drawImage(image, 0, 0);
-      return Array.from(context.getImageData(0, 0, image.width, image.height).data.filter((_, i) => i % 4 === 1));
-    }, bytes.toString("base64")));
+    sizes.push(
+      await page.evaluate(async (base64) => {
+        const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+        const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+        const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+        context.drawImage(image, 0, 0);
+        return Array.from(context.getImageData(0, 0, image.width, image.height).data.filter((_, i) => i % 4 === 1));
+      }, bytes.toString("base64")),
+    );
   }
   const changed = sizes[0].filter((value, i) => value !== sizes[1][i]).length / sizes[0].length;
   assert.ok(changed > 0.005 && changed < 0.3, `${(100 * changed).toFixed(1)} % of the pixels are axes`);
@@ -424,7 +449,12 @@ test("any views are shown together, and what is beside the view stays when its s
   const page = await open(SMALL, undefined, VIEWPORT);
   await reach(page, "complete");
   await setSlider(page, "error", 70);
-  const scene = () => page.evaluate(() => Object.entries(window.tetralodDemo.viewer.state).filter(([, part]) => (Array.isArray(part) ? part.length > 0 : true)).map(([name]) => name));
+  const scene = () =>
+    page.evaluate(() =>
+      Object.entries(window.tetralodDemo.viewer.state)
+        .filter(([, part]) => (Array.isArray(part) ? part.length > 0 : true))
+        .map(([name]) => name),
+    );
   const parts = ["isosurfaces", "volume", "slices", "boundary", "cells", "streamlines"];
   const has = async (...names) => {
     const found = async () => (await scene()).filter((part) => parts.includes(part)).sort();
@@ -451,7 +481,8 @@ test("any views are shown together, and what is beside the view stays when its s
   assert.equal(differing(together, await still(page, "together-turned")), 0, "the picture stays");
   await page.fill("#opacity", "40");
   await addressed(page, /view=slice&also=iso,solid&opacity=40/);
-  const opacities = () => page.evaluate(() => [window.tetralodDemo.viewer.state.isosurfaces[0], window.tetralodDemo.viewer.state.slices[0]].map(({ opacity }) => opacity));
+  const opacities = () =>
+    page.evaluate(() => [window.tetralodDemo.viewer.state.isosurfaces[0], window.tetralodDemo.viewer.state.slices[0]].map(({ opacity }) => opacity));
   assert.deepEqual(await opacities(), [1, 0.4]);
   // What is not shown beside the view takes its place.
   await show(page, "Mesh");
@@ -545,7 +576,8 @@ test("the data view shows where the blocks are, and the memory of the GPU", asyn
   const page = await open("data/bucky.mt", undefined, VIEWPORT);
   await reach(page, "complete");
   await press(page, "n");
-  const counts = () => page.evaluate(() => [...document.querySelectorAll("#blocks-counts b")].map(({ textContent }) => Number(textContent.replaceAll(",", ""))));
+  const counts = () =>
+    page.evaluate(() => [...document.querySelectorAll("#blocks-counts b")].map(({ textContent }) => Number(textContent.replaceAll(",", ""))));
   await page.locator("#blocks-canvas").waitFor({ timeout: PATIENCE });
   await settle(page);
   const map = await page.evaluate(async () => {
@@ -571,7 +603,10 @@ test("the data view shows where the blocks are, and the memory of the GPU", asyn
   await page.evaluate(() => window.tetralodDemo.viewer.refine({ error: "0.03%" }).then(() => window.tetralodDemo.viewer.settled()));
   await page.waitForFunction((missing) => Number(document.querySelector("#blocks-counts .missing b").textContent) < missing, missing, { timeout: PATIENCE });
 
-  const row = () => page.evaluate(() => [...document.querySelectorAll("#traffic dt")].find(({ textContent }) => textContent === "Memory on the GPU")?.nextElementSibling.textContent);
+  const row = () =>
+    page.evaluate(
+      () => [...document.querySelectorAll("#traffic dt")].find(({ textContent }) => textContent === "Memory on the GPU")?.nextElementSibling.textContent,
+    );
   assert.match(await row(), /^[\d.]+ [kMG]B$/);
   const { gpuBytes: surface } = await demo(page, "frame");
   await press(page, "5");
@@ -590,7 +625,10 @@ test("a volume that is being made is named, and can be opened once it is there",
       const list = await (await route.fetch()).json();
       const [{ title }, ...others] = list.volumes;
       // It is there the second time; what is not shown in the gallery is not named.
-      const pending = [{ title, isShown: true }, { title: "Hidden", isShown: false }];
+      const pending = [
+        { title, isShown: true },
+        { title: "Hidden", isShown: false },
+      ];
       await route.fulfill({ json: asked++ === 0 ? { volumes: others, pending } : list });
     });
   const page = await open(SMALL, prepare, VIEWPORT);
@@ -630,13 +668,17 @@ test("volumes without pictures get some: drawn ones, then those that the page ha
       for (const image of images) image.loading = "eager";
       return images.length > 0 && images.every((image) => image.complete);
     });
-    return page.evaluate(() => [...document.querySelectorAll("#gallery img")].map((image) => image instanceof HTMLImageElement && [image.src.slice(0, 14), image.naturalWidth]));
+    return page.evaluate(() =>
+      [...document.querySelectorAll("#gallery img")].map((image) => image instanceof HTMLImageElement && [image.src.slice(0, 14), image.naturalWidth]),
+    );
   };
   const drawn = await pictures();
   assert.ok(drawn.length > 3 && drawn.every(([, width]) => width > 0), JSON.stringify(drawn));
   await screenshot(page, "page-drawn-pictures");
   await page.keyboard.press("Escape");
-  await page.waitForFunction(() => Object.keys(localStorage).some((key) => key.startsWith("tetralod-picture data/bucky-small.mt")), undefined, { timeout: PATIENCE });
+  await page.waitForFunction(() => Object.keys(localStorage).some((key) => key.startsWith("tetralod-picture data/bucky-small.mt")), undefined, {
+    timeout: PATIENCE,
+  });
   const taken = await pictures();
   assert.equal(taken.filter(([start]) => start.startsWith("data:image/web")).length, 1, "of the volume that was shown");
   await screenshot(page, "page-taken-pictures");
@@ -687,10 +729,14 @@ test("another volume gets what fits it of the settings before, is told what does
   assert.equal(await demo(page, "error"), null);
 
   // A link that names what is not there is shown as far as it has a meaning.
-  await page.evaluate((url) => (location.hash = `#url=${url}&view=flow&surface-colour=T&field=T&isovalue=99&range=500,600&time=5&probes=9,9,9&seeds=9,9,9`), FLOW);
+  await page.evaluate(
+    (url) => (location.hash = `#url=${url}&view=flow&surface-colour=T&field=T&isovalue=99&range=500,600&time=5&probes=9,9,9&seeds=9,9,9`),
+    FLOW,
+  );
   await page.waitForFunction(() => window.tetralodDemo.info?.kind === "half-edge", undefined, { timeout: PATIENCE });
   await reach(page, "complete");
-  for (const words of [/field T/, /colours of T/, /isovalue 99 \(pressure is /, /colours of 500 to 600/, /1 probes outside/, /1 seeds outside/]) await noted(page, words);
+  for (const words of [/field T/, /colours of T/, /isovalue 99 \(pressure is /, /colours of 500 to 600/, /1 probes outside/, /1 seeds outside/])
+    await noted(page, words);
   assert.equal(await view(), "flow");
   assert.equal(await demo(page, "error"), null);
   assertDrawn(await picture(page, "link-of-another-volume"));
@@ -702,11 +748,18 @@ test("what means nothing in the address is ignored, and said", async () => {
   const page = await open(SMALL, undefined, VIEWPORT);
   await reach(page, "complete");
   const before = await page.evaluate(() => ["background", "pixels", "map"].map((id) => /** @type {HTMLInputElement} */ (document.getElementById(id)).value));
-  await page.evaluate((url) => (location.hash = `#url=${url}&background=x&box=1,1,1,0,0,0&pixels=abc&map=none&nonsense=1&axes=7&camera=1,2&view=iso&refine=none&range=symmetric`), SMALL);
-  for (const word of ["background=x", "box=1,1,1,0,0,0", "pixels=abc", "map=none", "nonsense=1", "axes=7", "camera=1,2", "refine=none"]) await noted(page, new RegExp(`means nothing: .*${word}`));
+  await page.evaluate(
+    (url) => (location.hash = `#url=${url}&background=x&box=1,1,1,0,0,0&pixels=abc&map=none&nonsense=1&axes=7&camera=1,2&view=iso&refine=none&range=symmetric`),
+    SMALL,
+  );
+  for (const word of ["background=x", "box=1,1,1,0,0,0", "pixels=abc", "map=none", "nonsense=1", "axes=7", "camera=1,2", "refine=none"])
+    await noted(page, new RegExp(`means nothing: .*${word}`));
   assert.doesNotMatch(await page.innerText("#note"), /view=|url=|range=/);
   await settle(page);
-  assert.deepEqual(await page.evaluate(() => ["background", "pixels", "map"].map((id) => /** @type {HTMLInputElement} */ (document.getElementById(id)).value)), before);
+  assert.deepEqual(
+    await page.evaluate(() => ["background", "pixels", "map"].map((id) => /** @type {HTMLInputElement} */ (document.getElementById(id)).value)),
+    before,
+  );
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
@@ -721,7 +774,9 @@ test("a surface coloured by a field, with probes, gives way to another volume", 
   await page.keyboard.press("p");
   await page.locator(".card").waitFor({ timeout: PATIENCE });
   // By keyboard, what is found is told.
-  await page.waitForFunction(() => /^Probe A: pressure [−\d.]+.*; velocity/.test(document.getElementById("status").textContent), undefined, { timeout: PATIENCE });
+  await page.waitForFunction(() => /^Probe A: pressure [−\d.]+.*; velocity/.test(document.getElementById("status").textContent), undefined, {
+    timeout: PATIENCE,
+  });
   await openAnother(page, SMALL, "edge");
   await noted(page, /does not have it: .*colours of velocity/);
   assert.equal(await page.locator(".card").count(), 0);
@@ -759,7 +814,10 @@ test("colours and values mean the same at all times", async () => {
   });
   const range = () => page.evaluate(() => window.tetralodDemo.viewer.legend?.range);
   const near = (found, wanted) => found.every((value, i) => Math.abs(value - wanted[i]) <= 1e-4 * (wanted[1] - wanted[0]));
-  for (const [key, wanted] of [["3", [low, high]], ["6", [0, speed]]]) {
+  for (const [key, wanted] of [
+    ["3", [low, high]],
+    ["6", [0, speed]],
+  ]) {
     await press(page, key);
     for (const time of [0, 5]) {
       await setSlider(page, "time", time);
@@ -808,7 +866,11 @@ test("on a phone the card of a probe stays in the picture", async () => {
   await settle(page);
   const stage = await page.locator("#canvas").boundingBox();
   let cards = 0;
-  for (const [x, y] of [[0.5, 0.5], [0.35, 0.45], [0.62, 0.55]]) {
+  for (const [x, y] of [
+    [0.5, 0.5],
+    [0.35, 0.45],
+    [0.62, 0.55],
+  ]) {
     await page.touchscreen.tap(stage.x + x * stage.width, stage.y + y * stage.height);
     await page.waitForTimeout(700);
     for (const card of await page.locator(".card").all()) {

@@ -52,8 +52,7 @@ async function reach(page, state) {
 }
 
 /** Waits for a mesh that is what was asked for. */
-const satisfied = (page) =>
-  page.waitForFunction(() => window.tetralodDemo.stats?.satisfied, undefined, { timeout: PATIENCE });
+const satisfied = (page) => page.waitForFunction(() => window.tetralodDemo.stats?.satisfied, undefined, { timeout: PATIENCE });
 
 test("the page fetches what it shows, tells when the network fails, and goes on when asked to", async () => {
   const page = await browser.newPage({ viewport: { width: 1100, height: 760 } });

@@ -109,7 +109,13 @@ function checkMesh({ tets, neighbors, positions, stats }) {
   }
 }
 
-for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => /** @type {[string, boolean][]} */ ([[kind, true], [kind, false]]))) {
+for (const [kind, worker] of Object.keys(blocks).flatMap(
+  (kind) =>
+    /** @type {[string, boolean][]} */ ([
+      [kind, true],
+      [kind, false],
+    ]),
+)) {
   describe(`${kind} in ${worker ? "a worker" : "the caller's thread"}`, () => {
     let hashes;
     before(async () => (hashes = await hashesOf(blocks[kind])));
@@ -322,7 +328,12 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => /** @type {[s
       checkMesh(meanwhile);
       assert.equal(meanwhile.stats.satisfied, false);
       const steps = mt.refineSteps(REQUESTS[0]);
-      await rejects((async () => { for await (const step of steps) checkMesh(step); })(), "network");
+      await rejects(
+        (async () => {
+          for await (const step of steps) checkMesh(step);
+        })(),
+        "network",
+      );
       answer = good;
       await mt.retry();
       await mt.refine(REQUESTS[0]);
@@ -373,7 +384,10 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => /** @type {[s
       const mesh = await streamed.refine(REQUESTS[0]);
       checkMesh(mesh);
       assert.equal(await streamed.hash(), hashes[0]);
-      assert.deepEqual(asked.map(({ start }) => start), [undefined]);
+      assert.deepEqual(
+        asked.map(({ start }) => start),
+        [undefined],
+      );
       assert.equal(asked[0].headers["x-key"], "open");
       streamed.free();
     });
@@ -411,7 +425,10 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => /** @type {[s
       for (const names of [["pressure", "speed"], ["speed"]]) {
         const before = sent;
         const mt = await open({ fields: names, gap: 0 });
-        assert.deepEqual(mt.info.fields.map(({ name }) => name), names);
+        assert.deepEqual(
+          mt.info.fields.map(({ name }) => name),
+          names,
+        );
         for (const [number, { name, min, max, floor }] of mt.info.fields.entries()) {
           assert.ok(floor > 0 && floor < 1e-3 * (max - min));
           const { stats } = await mt.refine({ error: "4%", field: number });
@@ -513,7 +530,10 @@ async function printed(code) {
     await writeFile(join(project, "example.mjs"), code.replace("import.meta.url", JSON.stringify(base)));
     const { stdout, stderr } = await promisify(execFile)("node", ["example.mjs"], { cwd: project });
     assert.equal(stderr, "");
-    return stdout.trim().split("\n").map((line) => line.split(" "));
+    return stdout
+      .trim()
+      .split("\n")
+      .map((line) => line.split(" "));
   } finally {
     await rm(project, { recursive: true });
   }

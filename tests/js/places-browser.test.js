@@ -95,7 +95,11 @@ before(async () => {
   const places = { "https://cdn.example": origin };
   const policy = cdn.replaceAll(/https:\/\/[\w.]+/g, (place) => places[place] ?? assert.fail(place));
   servers.foreign = await serve({ "content-security-policy": policy }, () => `${origin}/pkg/`);
-  const without = (name) => strict.split("; ").filter((directive) => !directive.startsWith(name)).join("; ");
+  const without = (name) =>
+    strict
+      .split("; ")
+      .filter((directive) => !directive.startsWith(name))
+      .join("; ");
   servers.noWorker = await serve({ "content-security-policy": `${without("worker-src")}; worker-src 'none'` });
   servers.noWasm = await serve({ "content-security-policy": strict.replace(" 'wasm-unsafe-eval'", "") });
   servers.inline = await serve({ "content-security-policy": strict.replace("worker-src 'self'", "worker-src 'self' blob:") });
@@ -113,10 +117,13 @@ async function run(server, module, how = {}) {
   const complaints = [];
   page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
   await page.goto(servers[server].address);
-  const found = await page.evaluate(async ({ module, how }) => {
-    const { run } = await import(`/${module}`);
-    return run(how).catch(({ code, message }) => ({ code, message }));
-  }, { module, how });
+  const found = await page.evaluate(
+    async ({ module, how }) => {
+      const { run } = await import(`/${module}`);
+      return run(how).catch(({ code, message }) => ({ code, message }));
+    },
+    { module, how },
+  );
   await page.close();
   return { found, complaints };
 }

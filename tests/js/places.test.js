@@ -69,7 +69,12 @@ test("files of any kind are read by the one module, whole or in pieces, and have
     for (let at = 0; at < other.length; at += 100) yield other.slice(at, at + 100);
   };
   /** @type {[import("../../pkg/index.js").Source, object][]} */
-  const ways = [[other, {}], [pieces(), {}], [pieces(), { worker: false }], [new Blob([other]), {}]];
+  const ways = [
+    [other, {}],
+    [pieces(), {}],
+    [pieces(), { worker: false }],
+    [new Blob([other]), {}],
+  ];
   for (const [source, how] of ways) {
     const mt = await MultiTessellation.open(source, how);
     await mt.complete;
@@ -87,7 +92,10 @@ test("the inline entry needs no other file, in a worker and in the caller's thre
   const other = new Uint8Array(await readFile(`${folder}/small-vertex.mt`));
   const [expectedOfOther] = JSON.parse(await readFile(`${folder}/hashes-vertex.json`, "utf8"));
   for (const worker of [true, false]) {
-    for (const [source, expected] of [[bytes, { options, hash }], [other, expectedOfOther]]) {
+    for (const [source, expected] of [
+      [bytes, { options, hash }],
+      [other, expectedOfOther],
+    ]) {
       const mt = await inline.MultiTessellation.open(source, { worker });
       await mt.complete;
       await mt.refine(expected.options);
@@ -101,7 +109,8 @@ test("the inline entry needs no other file, in a worker and in the caller's thre
 test("a worker that does not start, or is another one, is an error of configuration that says what to do", async () => {
   const open = (how) => MultiTessellation.open(bytes, how);
   await rejects(open({ workerUrl: at("no-such-worker.js") }), "worker", /no-such-worker\.js.*Set `workerUrl`.*"tetralod\/worker".*inline/);
-  const other = (found) => `data:text/javascript,${encodeURIComponent(`
+  const other = (found) =>
+    `data:text/javascript,${encodeURIComponent(`
     import { parentPort } from "node:worker_threads";
     parentPort.on("message", ({ id }) => parentPort.postMessage({ id, result: ${JSON.stringify(found)} }));`)}`;
   await rejects(open({ workerUrl: other({ name: "core", version: "0.0.1" }) }), "worker", /tetralod 0\.0\.1/);

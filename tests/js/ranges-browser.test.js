@@ -93,7 +93,11 @@ function fetchIn(path, ranges, options = {}) {
 }
 
 /** @type {[number, number][]} */
-const RANGES = [[1000, 50_000], [100_000, 160_000], [199_000, SIZE + 9]];
+const RANGES = [
+  [1000, 50_000],
+  [100_000, 160_000],
+  [199_000, SIZE + 9],
+];
 const sum = (start, end) => file.slice(start, end).reduce((total, byte) => total + byte, 0);
 const expected = Object.fromEntries([[0, 100], ...RANGES].map(([start, end]) => [start, sum(start, end)]));
 
@@ -102,7 +106,10 @@ test("ranges of another origin need no preflight, and no header but the one that
   assert.deepEqual(hidden.sums, Object.fromEntries(Object.entries(expected).slice(0, 3)), hidden.message);
   const exposed = await fetchIn("/exposed", RANGES);
   assert.deepEqual([exposed.sums, exposed.total], [expected, SIZE], exposed.message);
-  assert.ok(asked.every(({ method }) => method === "GET"), JSON.stringify(asked));
+  assert.ok(
+    asked.every(({ method }) => method === "GET"),
+    JSON.stringify(asked),
+  );
 });
 
 test("headers of the caller go to no other origin", async () => {
@@ -126,7 +133,10 @@ test("headers of the caller go to no other origin", async () => {
   base = url;
   assert.deepEqual(sums, expected, message);
   assert.ok(redirected.length < told.length && redirected.every((header) => header === "Bearer secret"), JSON.stringify(redirected));
-  assert.ok(told.every((header) => header === undefined), JSON.stringify(told));
+  assert.ok(
+    told.every((header) => header === undefined),
+    JSON.stringify(told),
+  );
 });
 
 test("what the browser forbids is told from a server that is away", async () => {

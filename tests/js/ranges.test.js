@@ -10,7 +10,13 @@ import { RangeLoader } from "../../pkg/tetralod_core.js";
 
 const SIZE = 200_000;
 const file = new Uint8Array(SIZE).map((_, at) => (at * 7 + (at >> 8) * 31 + (at >> 16) * 101) & 255);
-const WANTED = [[0, 1000], [1200, 50_000], [60_000, 60_010], [100_000, 160_000], [199_000, SIZE + 7]];
+const WANTED = [
+  [0, 1000],
+  [1200, 50_000],
+  [60_000, 60_010],
+  [100_000, 160_000],
+  [199_000, SIZE + 7],
+];
 
 let server;
 let base;
@@ -78,7 +84,10 @@ function fetchAll(wanted, options = {}, url = base) {
     };
     const quick = { retries: 3, backoffMs: 10, timeoutMs: 400, maxRequestBytes: 30_000, gap: 500 };
     ranges = open(url, { onRange, onError: reject }, { ...quick, ...options });
-    want(ranges, wanted.flatMap(([start, end]) => [start, end, -start]));
+    want(
+      ranges,
+      wanted.flatMap(([start, end]) => [start, end, -start]),
+    );
   });
   return all.finally(() => options.open || ranges.close());
 }
@@ -261,7 +270,10 @@ for (const lasts of [true, false]) {
       other.close();
     }
     assert.ok(asked.every(({ headers }) => headers.authorization === "Bearer secret"));
-    assert.ok(told.every(([authorization]) => authorization === undefined), JSON.stringify(told));
+    assert.ok(
+      told.every(([authorization]) => authorization === undefined),
+      JSON.stringify(told),
+    );
     if (lasts) assert.ok(asked.length < told.length, `redirected ${asked.length} of ${told.length} times`);
     else assert.ok(told.length <= asked.length + 6, `${told.length} requests, ${asked.length} of them redirected`);
   });
@@ -344,7 +356,15 @@ test("what was fetched once is kept for the next time", async () => {
       await new Promise((resolve, reject) => {
         const onRange = (start, end, bytes) => {
           got.set(start, bytes);
-          if (start === 0 && got.size === 1) setTimeout(() => want(second, WANTED.slice(1).flatMap(([a, b]) => [a, b, 0])), 20);
+          if (start === 0 && got.size === 1)
+            setTimeout(
+              () =>
+                want(
+                  second,
+                  WANTED.slice(1).flatMap(([a, b]) => [a, b, 0]),
+                ),
+              20,
+            );
           if (got.size === WANTED.length) resolve(undefined);
         };
         second = open(base, { onRange, onError: reject }, { cache: "mt" });

@@ -62,7 +62,10 @@ test("every page of docs/ and every entry of the package is in the site", async 
 });
 
 test("nothing is fetched from elsewhere, no page is wider than a phone, and none complains, without a server", async () => {
-  for (const [colorScheme, width] of /** @type {const} */ ([["light", 1280], ["dark", 390]])) {
+  for (const [colorScheme, width] of /** @type {const} */ ([
+    ["light", 1280],
+    ["dark", 390],
+  ])) {
     const context = await browser.newContext({ colorScheme, viewport: { width, height: 900 } });
     const page = await context.newPage();
     const complaints = [];
@@ -88,14 +91,13 @@ test("the search finds calls of the API and words of the pages", async () => {
   const page = await browser.newPage();
   await page.goto(pathToFileURL(join(site, "index.html")).href);
   await page.locator("#tsd-search-trigger").click();
-  for (const [words, wanted] of [["isosurface", "isosurface"], ["nginx", "Hosting"]]) {
+  for (const [words, wanted] of [
+    ["isosurface", "isosurface"],
+    ["nginx", "Hosting"],
+  ]) {
     await page.locator("#tsd-search-input").fill(words);
     await page.locator("#tsd-search-results li").first().waitFor();
-    await page.waitForFunction(
-      (text) => document.querySelector("#tsd-search-results").textContent.includes(text),
-      wanted,
-      { timeout: 10_000 },
-    );
+    await page.waitForFunction((text) => document.querySelector("#tsd-search-results").textContent.includes(text), wanted, { timeout: 10_000 });
   }
   await page.close();
 });

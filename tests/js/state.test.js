@@ -48,7 +48,13 @@ const seen = (page) =>
     const controls = all.filter(({ id }) => !["split", "difference", "freeze"].includes(id));
     const { request, viewer } = window.tetralodDemo;
     const words = [...document.querySelectorAll("#settings output:not(#transfer-chosen)")].map(({ textContent }) => textContent);
-    return { hash: location.hash, controls: controls.map((one) => [`${one.id || one.name} ${one.type === "radio" ? one.value : ""}`, value(one)]), words, request, scene: viewer.state };
+    return {
+      hash: location.hash,
+      controls: controls.map((one) => [`${one.id || one.name} ${one.type === "radio" ? one.value : ""}`, value(one)]),
+      words,
+      request,
+      scene: viewer.state,
+    };
   });
 
 /**
@@ -59,7 +65,11 @@ async function changeAll(page) {
   const states = [await seen(page)];
   const count = await page.locator("#settings input, #settings select").count();
   const ofView = ["#opacity", "#edges"];
-  const controls = [...Array.from({ length: count }, (_, i) => [`#settings :is(input, select):not(${ofView})`, i]), ["[name=mode][value=slice]", 0], ...ofView.map((id) => [id, 0])];
+  const controls = [
+    ...Array.from({ length: count }, (_, i) => [`#settings :is(input, select):not(${ofView})`, i]),
+    ["[name=mode][value=slice]", 0],
+    ...ofView.map((id) => [id, 0]),
+  ];
   for (const which of controls) {
     const isChanged = await page.evaluate(([selector, i]) => {
       const control = /** @type {any} */ (document.querySelectorAll(selector)[i]);
@@ -152,9 +162,15 @@ test("what is done in the picture is part of the state: probes, seeds, and the c
   await step(() => page.check("#orthographic"));
   await step(() => page.click("#home"));
   await step(() => page.click("#reset"));
-  assert.deepEqual(steps.map(({ cards }) => cards), [1, 2, 2, 1, 1, 1, 0]);
+  assert.deepEqual(
+    steps.map(({ cards }) => cards),
+    [1, 2, 2, 1, 1, 1, 0],
+  );
   assert.equal(new Set(steps.map(({ hash }) => hash)).size, steps.length, "each is a step");
-  for (const [button, order] of [["#undo", steps.slice(0, -1).reverse()], ["#redo", steps.slice(1)]]) {
+  for (const [button, order] of [
+    ["#undo", steps.slice(0, -1).reverse()],
+    ["#redo", steps.slice(1)],
+  ]) {
     for (const wanted of order) {
       await page.click(button);
       await page.waitForFunction((cards) => document.querySelectorAll(".card").length === cards, wanted.cards, { timeout: PATIENCE });

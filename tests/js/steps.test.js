@@ -31,14 +31,44 @@ const VIEW = { matrix: camera(1), viewport: [800, 800], pixels: 2 };
  */
 const REQUESTS = {
   "two needs": { error: "5%", needs: [{ error: "1%", sphere: { center: [0.2, 0.2, 0.2], radius: 0.2 } }] },
-  "an oriented box": { orientedBox: { center: [0.5, 0.5, 0.5], halfAxes: [[0.1, 0.1, 0], [-0.1, 0.1, 0], [0, 0, 0.2]] } },
+  "an oriented box": {
+    orientedBox: {
+      center: [0.5, 0.5, 0.5],
+      halfAxes: [
+        [0.1, 0.1, 0],
+        [-0.1, 0.1, 0],
+        [0, 0, 0.2],
+      ],
+    },
+  },
   "a half-space": { error: "1%", halfSpace: { normal: [1, 1, 0], offset: 0.5 } },
   "a slab": { error: "1%", slab: { normal: [0, 0, 1], offset: 0.5, thickness: 0.01 } },
-  "planes": { error: "1%", planes: [[1, 0, 0, 0.3], [0, 1, 0, 0.3]] },
-  "ranges": { error: "1%", ranges: [[0.2, 0.3], [0.6, 0.7]] },
+  "planes": {
+    error: "1%",
+    planes: [
+      [1, 0, 0, 0.3],
+      [0, 1, 0, 0.3],
+    ],
+  },
+  "ranges": {
+    error: "1%",
+    ranges: [
+      [0.2, 0.3],
+      [0.6, 0.7],
+    ],
+  },
   "a view": { view: VIEW },
   "a view with an outside": { view: { ...VIEW, pixels: 1, outside: "5%" } },
-  "a transfer function": { error: 0.05, transfer: { points: [[0.2, 0, 0, 0, 0], [0.6, 1, 0, 0, 0.5]], unitLength: 0.2 } },
+  "a transfer function": {
+    error: 0.05,
+    transfer: {
+      points: [
+        [0.2, 0, 0, 0, 0],
+        [0.6, 1, 0, 0, 0.5],
+      ],
+      unitLength: 0.2,
+    },
+  },
   "budgets": { error: 0, maxVertices: 900 },
   "bytes": { error: 0, maxBytes: 100_000 },
   "a little": { error: "50%" },
@@ -299,7 +329,10 @@ describe("a function in the caller's thread", () => {
     await mt.complete;
     return mt;
   };
-  const everywhere = (error) => ({ errors }) => errors.map((e) => (e > error ? e / error : 0));
+  const everywhere =
+    (error) =>
+    ({ errors }) =>
+      errors.map((e) => (e > error ? e / error : 0));
 
   test("sees tetrahedra in batches, and its answers make the mesh", async () => {
     const mt = await open();
@@ -341,7 +374,15 @@ describe("a function in the caller's thread", () => {
 
   test("that fails is told, and the MT stays usable", async () => {
     const mt = await open();
-    await refuses(mt.refine({ where: () => { throw new Error("my mistake"); } }), "where", /my mistake/);
+    await refuses(
+      mt.refine({
+        where: () => {
+          throw new Error("my mistake");
+        },
+      }),
+      "where",
+      /my mistake/,
+    );
     await refuses(mt.refine({ where: () => [1] }), "where", /one number for each/);
     await refuses(mt.refine({ where: /** @type {any} */ (() => 7) }), "where", /one number for each/);
     assert.ok((await mt.refine({ where: ({ count }) => new Array(count).fill(NaN) })).stats.satisfied);

@@ -17,7 +17,11 @@ test("who uses a value is told of another one, once all have changed", () => {
   assert.deepEqual(told, [["ab", { a: 5, b: 6, c: 3 }], ["any"]]);
   told.length = 0;
   store.replace({ c: 3 });
-  assert.deepEqual(told.map(([name]) => name), ["ab", "c", "any"], "what the values are of is another");
+  assert.deepEqual(
+    told.map(([name]) => name),
+    ["ab", "c", "any"],
+    "what the values are of is another",
+  );
 });
 
 test("changes by who is told come after what waits already, and each is told of the last state", () => {

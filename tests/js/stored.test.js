@@ -44,8 +44,18 @@ test("fields are stored each in its own way, and absolute again", () => {
   }
 
   const wanted = fieldsOf(() => info, ["t", "p"]);
-  const stored = withFields({ ...triangle, ...NEAR }, wanted, [values, triangle.values].map((numbers) => Float64Array.from(numbers)));
-  assert.deepEqual(stored.fields.map(({ index, name }) => [index, name]), [[1, "t"], [0, "p"]]);
+  const stored = withFields(
+    { ...triangle, ...NEAR },
+    wanted,
+    [values, triangle.values].map((numbers) => Float64Array.from(numbers)),
+  );
+  assert.deepEqual(
+    stored.fields.map(({ index, name }) => [index, name]),
+    [
+      [1, "t"],
+      [0, "p"],
+    ],
+  );
   for (const field of stored.fields) assert.deepEqual(field.values, triangle.values);
   const [t, p] = absolute(stored).fields;
   assert.deepEqual([[...t.values], t.offset, t.scale], [values, 0, 1]);
@@ -126,8 +136,20 @@ test("three.js gets an attribute for each field that is asked for, and none of o
   const surface = await createThreeSurface(/** @type {any} */ (volume), { boundary: true, fields: ["p", "q"] }, { three: /** @type {any} */ (three) });
   // Arrays that take the place of others have room for more.
   const values = (name) => surface.geometry.hasAttribute(name) && [...surface.geometry.getAttribute(name).array.subarray(0, 3)];
-  assert.deepEqual(surface.fields.map(({ name, attribute, offset, scale }) => [name, attribute, offset, scale]), [["p", "field0", 100, 2], ["q", "field1", 0, 1]]);
-  assert.deepEqual([values("field0"), values("field1")], [[1, 2, 3], [4, 5, 6]]);
+  assert.deepEqual(
+    surface.fields.map(({ name, attribute, offset, scale }) => [name, attribute, offset, scale]),
+    [
+      ["p", "field0", 100, 2],
+      ["q", "field1", 0, 1],
+    ],
+  );
+  assert.deepEqual(
+    [values("field0"), values("field1")],
+    [
+      [1, 2, 3],
+      [4, 5, 6],
+    ],
+  );
   await surface.update({ boundary: true, fields: ["p"] });
   assert.deepEqual([values("field0"), values("field1")], [[1, 2, 3], false]);
   await surface.update({ boundary: true });

@@ -13,28 +13,41 @@ const GRID = [16, 12];
  * @param {Buffer} png
  */
 export function study(page, png) {
-  return page.evaluate(async ([base64, columns, rows]) => {
-    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-    const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
-    context.drawImage(image, 0, 0);
-    const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
-    const channels = (pixel) => [pixel & 255, (pixel >> 8) & 255, (pixel >> 16) & 255];
-    const isCovered = (pixel, i) => {
-      const background = channels(pixels[i - (i % image.width) + 4]);
-      return channels(pixel).some((value, c) => Math.abs(value - background[c]) > 8);
-    };
-    const covered = pixels.filter(isCovered);
-    const sample = Array.from(pixels.filter((_, i) => i % 97 === 0));
-    const sums = Array.from({ length: columns * rows }, () => [0, 0, 0, 0]);
-    pixels.forEach((pixel, i) => {
-      const [column, row] = [Math.floor(((i % image.width) * columns) / image.width), Math.floor((Math.floor(i / image.width) * rows) / image.height)];
-      const sum = sums[column + columns * row];
-      [...channels(pixel), 1].forEach((value, c) => (sum[c] += value));
-    });
-    const grid = sums.map(([r, g, b, count]) => [r, g, b].map((sum) => Math.round(sum / count).toString(16).padStart(2, "0")).join("")).join(" ");
-    return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample, width: image.width, grid };
-  }, /** @type {const} */ ([png.toString("base64"), ...GRID]));
+  return page.evaluate(
+    async ([base64, columns, rows]) => {
+      const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+      const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+      const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+      context.drawImage(image, 0, 0);
+      const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
+      const channels = (pixel) => [pixel & 255, (pixel >> 8) & 255, (pixel >> 16) & 255];
+      const isCovered = (pixel, i) => {
+        const background = channels(pixels[i - (i % image.width) + 4]);
+        return channels(pixel).some((value, c) => Math.abs(value - background[c]) > 8);
+      };
+      const covered = pixels.filter(isCovered);
+      const sample = Array.from(pixels.filter((_, i) => i % 97 === 0));
+      const sums = Array.from({ length: columns * rows }, () => [0, 0, 0, 0]);
+      pixels.forEach((pixel, i) => {
+        const [column, row] = [Math.floor(((i % image.width) * columns) / image.width), Math.floor((Math.floor(i / image.width) * rows) / image.height)];
+        const sum = sums[column + columns * row];
+        [...channels(pixel), 1].forEach((value, c) => (sum[c] += value));
+      });
+      const grid = sums
+        .map(([r, g, b, count]) =>
+          [r, g, b]
+            .map((sum) =>
+              Math.round(sum / count)
+                .toString(16)
+                .padStart(2, "0"),
+            )
+            .join(""),
+        )
+        .join(" ");
+      return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample, width: image.width, grid };
+    },
+    /** @type {const} */ ([png.toString("base64"), ...GRID]),
+  );
 }
 
 /** Something larger than a few lines is drawn, and it is lit or coloured. */

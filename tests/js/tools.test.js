@@ -7,7 +7,14 @@ import { MultiTessellation, absolute } from "../../pkg/index.js";
 /** The corners of a cube far from the origin, and the six tetrahedra around a diagonal of it. */
 const ORIGIN = [600_000, 0, 0];
 const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((v) => ORIGIN.map((x, axis) => x + ((v >> axis) & 1)));
-const tets = [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
+const tets = [
+  [0, 1, 3, 7],
+  [0, 3, 2, 7],
+  [0, 2, 6, 7],
+  [0, 6, 4, 7],
+  [0, 4, 5, 7],
+  [0, 5, 1, 7],
+];
 const linear = ([x, y, z]) => x - ORIGIN[0] + 2 * y + 3 * z;
 const time = ([x, y, z]) => 1.7e9 + 5 * (x - ORIGIN[0]) - y + 2 * z;
 
@@ -18,7 +25,15 @@ function vtu() {
     <Piece NumberOfPoints="8" NumberOfCells="6">
     <PointData>${array("Float64", "p", corners.map(linear))}${array("Float64", "t", corners.map(time))}</PointData>
     <Points>${array("Float64", "Points", corners.flat(), 'NumberOfComponents="3"')}</Points>
-    <Cells>${array("Int64", "connectivity", tets.flat())}${array("Int64", "offsets", tets.map((_, i) => 4 * i + 4))}${array("UInt8", "types", tets.map(() => 10))}</Cells>
+    <Cells>${array("Int64", "connectivity", tets.flat())}${array(
+      "Int64",
+      "offsets",
+      tets.map((_, i) => 4 * i + 4),
+    )}${array(
+      "UInt8",
+      "types",
+      tets.map(() => 10),
+    )}</Cells>
     </Piece></UnstructuredGrid></VTKFile>`;
 }
 
@@ -37,8 +52,15 @@ test("fields on surfaces are those of the mesh, each stored in its own way", asy
     };
     for (const [name, surface] of Object.entries(surfaces)) {
       assert.ok(surface.indices.length > 0, name);
-      assert.deepEqual(surface.fields.map(({ index, unit, offset, scale }) => [index, unit, offset, scale]), stored, name);
-      const { positions, fields: [p, t] } = absolute(surface);
+      assert.deepEqual(
+        surface.fields.map(({ index, unit, offset, scale }) => [index, unit, offset, scale]),
+        stored,
+        name,
+      );
+      const {
+        positions,
+        fields: [p, t],
+      } = absolute(surface);
       assert.ok(p.values instanceof Float32Array && t.values instanceof Float64Array, name);
       for (let i = 0; i < p.values.length; i++) {
         const point = positions.subarray(3 * i, 3 * i + 3);
@@ -46,7 +68,9 @@ test("fields on surfaces are those of the mesh, each stored in its own way", asy
         assert.ok(Math.abs(t.values[i] - time(point)) < 1e-3, `${name}: ${t.values[i]} at ${point}`);
       }
     }
-    const { fields: [only, ...none] } = await mt.surface({ fields: ["t"] });
+    const {
+      fields: [only, ...none],
+    } = await mt.surface({ fields: ["t"] });
     assert.deepEqual([only.name, none.length], ["t", 0]);
     assert.deepEqual((await mt.isosurface(1.5)).fields, []);
     await assert.rejects(async () => mt.surface({ fields: ["q"] }), { code: "bad-option", message: /`fields`.* p, t; not q/ });

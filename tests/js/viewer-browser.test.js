@@ -54,25 +54,38 @@ async function opened(options = {}) {
 
 test("what a viewer gives of its mesh is what MultiTessellation gives, with one module and one download", async () => {
   const page = await opened();
-  const own = () => page.evaluate(async () => {
-    const mt = window.tetralodDemo.mt ?? window.tetralodDemo.viewer;
-    const how = { fields: true };
-    const slice = await mt.slice([0, 0, 1], 0.5, how);
-    const { positions } = slice;
-    const [[p], line, surface, lines] = [
-      await mt.probe([0.5, 0.5, 0.5]), await mt.line([0, 0, 0], [1, 1, 1]), await mt.surface(how), await mt.isosurface(0.5, how),
-    ];
-    const { volume, histogram } = await mt.stats({ bins: 4 });
-    const sizes = [positions, line.at, surface.indices, lines.positions, lines.normals].map((array) => array.length);
-    // The order of vertices depends on what was asked for before.
-    const fields = [slice, surface, lines].map(({ fields }) => fields.map(({ index, name, values }) => [index, name, Array.from(values).sort((a, b) => a - b)]));
-    return JSON.stringify({ sizes, fields, p, volume, bins: Array.from(histogram), hash: await mt.hash() });
-  });
+  const own = () =>
+    page.evaluate(async () => {
+      const mt = window.tetralodDemo.mt ?? window.tetralodDemo.viewer;
+      const how = { fields: true };
+      const slice = await mt.slice([0, 0, 1], 0.5, how);
+      const { positions } = slice;
+      const [[p], line, surface, lines] = [
+        await mt.probe([0.5, 0.5, 0.5]),
+        await mt.line([0, 0, 0], [1, 1, 1]),
+        await mt.surface(how),
+        await mt.isosurface(0.5, how),
+      ];
+      const { volume, histogram } = await mt.stats({ bins: 4 });
+      const sizes = [positions, line.at, surface.indices, lines.positions, lines.normals].map((array) => array.length);
+      // The order of vertices depends on what was asked for before.
+      const fields = [slice, surface, lines].map(({ fields }) =>
+        fields.map(({ index, name, values }) => [index, name, Array.from(values).sort((a, b) => a - b)]),
+      );
+      return JSON.stringify({ sizes, fields, p, volume, bins: Array.from(histogram), hash: await mt.hash() });
+    });
   asked = [];
   const ofViewer = await own();
-  assert.ok(JSON.parse(ofViewer).sizes.every((size) => size > 0), ofViewer);
+  assert.ok(
+    JSON.parse(ofViewer).sizes.every((size) => size > 0),
+    ofViewer,
+  );
   assert.deepEqual(asked, [], "nothing is downloaded again");
-  assert.deepEqual(server.asked.filter((name) => name.endsWith(".wasm")), ["tetralod_viewer_bg.wasm"], "one module");
+  assert.deepEqual(
+    server.asked.filter((name) => name.endsWith(".wasm")),
+    ["tetralod_viewer_bg.wasm"],
+    "one module",
+  );
   const same = await page.evaluate(async () => {
     const { MultiTessellation } = await import("tetralod");
     window.tetralodDemo.mt = await MultiTessellation.open("/model.mt");
@@ -80,13 +93,20 @@ test("what a viewer gives of its mesh is what MultiTessellation gives, with one 
     const shown = await window.tetralodDemo.viewer.mesh({ fields: true });
     const arrays = ["positions", "field", "tets", "neighbors"].map((name) => whole[name].length === shown[name].length);
     const own = [whole, shown].map(({ field, fields: [{ values }] }) => values.every((value, i) => value === field[i]));
-    const vertices = ({ positions, fields: [{ values }] }) => Array.from(values, (value, i) => [...positions.subarray(3 * i, 3 * i + 3), value].join()).sort().join(" ");
+    const vertices = ({ positions, fields: [{ values }] }) =>
+      Array.from(values, (value, i) => [...positions.subarray(3 * i, 3 * i + 3), value].join())
+        .sort()
+        .join(" ");
     return [...arrays, ...own, vertices(whole) === vertices(shown)];
   });
   assert.deepEqual(same, Array(7).fill(true));
   assert.equal(await own(), ofViewer);
   const codes = await page.evaluate(() => {
-    const code = (promise) => promise.then(() => "none", (error) => error.code);
+    const code = (promise) =>
+      promise.then(
+        () => "none",
+        (error) => error.code,
+      );
     const { viewer } = window.tetralodDemo;
     return Promise.all([viewer.probe([1, 2]), viewer.stats({ bin: 1 }), viewer.slice([0, 0, 0], 1)].map(code));
   });
@@ -101,7 +121,10 @@ test("what is wrong is refused and changes nothing, what comes with it is not, a
   const page = await opened();
   await page.evaluate(CODES);
   const seen = await page.evaluate(async () => {
-    const { codeOf, tetralodDemo: { viewer, events } } = /** @type {any} */ (window);
+    const {
+      codeOf,
+      tetralodDemo: { viewer, events },
+    } = /** @type {any} */ (window);
     const [x] = viewer.info.fields.map(({ name }) => name);
     await viewer.set({ isosurfaces: [{ field: x }], boundary: { opacity: 0.5 } });
     const before = JSON.stringify(viewer.state);
@@ -128,9 +151,17 @@ test("what is wrong is refused and changes nothing, what comes with it is not, a
   assert.deepEqual(seen, { refused: Array(9).fill("bad-option"), good: "none", isSame: true, outline: false, meshes: ["bad-option", "none"], errors: 0 });
 
   const other = await page.evaluate(async () => {
-    const { codeOf, tetralodDemo: { viewer, events } } = /** @type {any} */ (window);
+    const {
+      codeOf,
+      tetralodDemo: { viewer, events },
+    } = /** @type {any} */ (window);
     const [x] = viewer.info.fields.map(({ name }) => name);
-    await viewer.set({ isosurfaces: [], boundary: null, colours: { range: [0.1, 0.2] }, streamlines: { fields: [x, x, x], seeds: [[0.5, 0.5, 0.5]], field: x } });
+    await viewer.set({
+      isosurfaces: [],
+      boundary: null,
+      colours: { range: [0.1, 0.2] },
+      streamlines: { fields: [x, x, x], seeds: [[0.5, 0.5, 0.5]], field: x },
+    });
     await viewer.refine({ error: "5%" });
     const { dropped, info } = await viewer.open("/fields.mt");
     const { state } = viewer;
@@ -139,9 +170,17 @@ test("what is wrong is refused and changes nothing, what comes with it is not, a
     const own = await viewer.open("/fields.mt", { state: { isosurfaces: null, slices: [{ normal: [0, 0, 1], offset: 1e9 }], boundary: {} } });
     const failed = await codeOf(viewer.open("/nothing.mt"));
     return {
-      names: info.fields.map(({ name }) => name), parts: dropped.map(({ part }) => part), problem: dropped[0]?.problem,
-      isosurfaces: state.isosurfaces, streamlines: state.streamlines, again, mesh,
-      own: own.dropped.map(({ part }) => part), boundary: viewer.state.boundary, slices: viewer.state.slices, failed,
+      names: info.fields.map(({ name }) => name),
+      parts: dropped.map(({ part }) => part),
+      problem: dropped[0]?.problem,
+      isosurfaces: state.isosurfaces,
+      streamlines: state.streamlines,
+      again,
+      mesh,
+      own: own.dropped.map(({ part }) => part),
+      boundary: viewer.state.boundary,
+      slices: viewer.state.slices,
+      failed,
       still: await codeOf(viewer.refine({ error: "5%" })),
       errors: events.filter(({ name }) => name === "error").length,
     };
@@ -191,7 +230,10 @@ test("at rest the picture shows what was set", async () => {
     }
     return counts;
   });
-  assert.ok(drawn.every((frames) => frames > 0), `pictures after each change: ${drawn}`);
+  assert.ok(
+    drawn.every((frames) => frames > 0),
+    `pictures after each change: ${drawn}`,
+  );
   await page.close();
 });
 
@@ -216,7 +258,10 @@ test("a request that is given up leaves the one before it", async () => {
   const page = await opened();
   await page.evaluate(CODES);
   const seen = await page.evaluate(async () => {
-    const { codeOf, tetralodDemo: { viewer } } = /** @type {any} */ (window);
+    const {
+      codeOf,
+      tetralodDemo: { viewer },
+    } = /** @type {any} */ (window);
     const { tetrahedra } = await viewer.refine({ error: "20%" });
     await viewer.freeze();
     const control = new AbortController();
@@ -237,10 +282,21 @@ test("a request that is given up leaves the one before it", async () => {
     const third = await gone;
     await viewer.freeze(false);
     await viewer.settled();
-    return { first, second, third, whole, tetrahedra, now: (await viewer.mesh()).tets.length / 4, early: await codeOf(viewer.surface({ signal: AbortSignal.abort() })) };
+    return {
+      first,
+      second,
+      third,
+      whole,
+      tetrahedra,
+      now: (await viewer.mesh()).tets.length / 4,
+      early: await codeOf(viewer.surface({ signal: AbortSignal.abort() })),
+    };
   });
   const { first, second, third, whole, tetrahedra, now, early } = seen;
-  assert.deepEqual([first, second, third, early].map((code) => (code === 20 ? "AbortError" : code)), ["AbortError", "none", "AbortError", "AbortError"]);
+  assert.deepEqual(
+    [first, second, third, early].map((code) => (code === 20 ? "AbortError" : code)),
+    ["AbortError", "none", "AbortError", "AbortError"],
+  );
   assert.ok(whole > 2 * tetrahedra, "who waits for the same mesh gets it");
   assert.equal(now, tetrahedra);
   await page.close();
@@ -256,7 +312,11 @@ test("a canvas is used again by another viewer, as StrictMode does, and stays un
     // An effect, its end, and the effect again, before anything has happened.
     const first = Viewer.create(canvas, { signal: aborted.signal });
     aborted.abort();
-    const code = (promise) => promise.then(() => "none", (error) => (error instanceof DOMException ? error.name : error.code));
+    const code = (promise) =>
+      promise.then(
+        () => "none",
+        (error) => (error instanceof DOMException ? error.name : error.code),
+      );
     const seen = [await code(first)];
     const mine = await Viewer.create(canvas);
     seen.push(await code(Viewer.create(canvas)));
@@ -335,10 +395,11 @@ test("a GPU that is lost is opened again, and draws what it drew", async () => {
   const page = await opened();
   const show = (isosurfaces) => page.evaluate((scene) => window.tetralodDemo.viewer.set(scene), { isosurfaces, outline: false });
   /** What the viewer draws with a fixed number of samples, byte for byte. */
-  const drawn = () => page.evaluate(async () => {
-    const bytes = new Uint8Array(await (await window.tetralodDemo.viewer.screenshot({ samples: 4 })).arrayBuffer());
-    return String(bytes);
-  });
+  const drawn = () =>
+    page.evaluate(async () => {
+      const bytes = new Uint8Array(await (await window.tetralodDemo.viewer.screenshot({ samples: 4 })).arrayBuffer());
+      return String(bytes);
+    });
   /** What is on the screen. How often a picture was drawn again for smooth edges depends on the speed of the machine. */
   const picture = async () => study(page, await page.locator("canvas").first().screenshot());
   const pictureWhere = async (holds) => {

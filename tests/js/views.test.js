@@ -84,7 +84,10 @@ for (const worker of [true, false]) {
       assert.deepEqual([mesh.positions, mesh.tets], [now.positions, now.tets]);
       // What the deltas lack is not left as it was; what the mesh lacks cannot be made up.
       const started = applyChanges(emptyMesh(), { ...delta, changes: { ...delta.changes, from: 0, vertices: new Uint32Array(), tets: new Uint32Array() } });
-      assert.deepEqual(lengths(started).map((length) => length !== undefined), [true, false, true, false]);
+      assert.deepEqual(
+        lengths(started).map((length) => length !== undefined),
+        [true, false, true, false],
+      );
       assert.throws(() => applyChanges({ changes: { ...delta.changes, to: delta.changes.from } }, delta), /`positions`/);
       await rejects(mt.refine({}, { arrays: /** @type {any} */ (["normals"]) }), "bad-option", /`arrays`.*positions, field, tets, neighbors/);
       await rejects(mt.refine({}, { arrays: /** @type {any} */ ("tets") }), "bad-option", /`arrays`/);
@@ -119,7 +122,10 @@ for (const worker of [true, false]) {
       const steps = [];
       for await (const { stats } of mt.refineSteps({ error: "3%" }, { updates: 50, arrays: [] })) steps.push(stats);
       assert.ok(steps.length > 1);
-      assert.deepEqual(steps.map(({ limitedBy }) => limitedBy), steps.map(({ done }) => (done ? "error" : undefined)));
+      assert.deepEqual(
+        steps.map(({ limitedBy }) => limitedBy),
+        steps.map(({ done }) => (done ? "error" : undefined)),
+      );
       mt.free();
       const small = await open(url, { memory: 100_000 });
       assert.equal((await small.refine({ error: 0 }, { arrays: [] })).stats.limitedBy, "memory");
@@ -139,7 +145,10 @@ for (const worker of [true, false]) {
       assert.deepEqual(of("stats"), [stats]);
       works = false;
       await rejects(mt.refine({ error: 0 }), "network");
-      assert.deepEqual(of("error").map((error) => [error instanceof TetralodError, error.code]), [[true, "network"]]);
+      assert.deepEqual(
+        of("error").map((error) => [error instanceof TetralodError, error.code]),
+        [[true, "network"]],
+      );
       mt.free();
       const ends = await open(new Blob([whole.subarray(0, whole.length - 5)]));
       const failed = new Promise((resolve) => ends.addEventListener("error", ({ detail }) => resolve(detail)));
@@ -233,11 +242,7 @@ for (const worker of [true, false]) {
       assert.equal(await mt.hash(), before);
       const delta = await mt.refine({ error: "20%" }, { deltas: true });
       assert.deepEqual([delta.changes.from, delta.changes.tets.length], [mesh.changes.to, 0]);
-      for (const call of [
-        mt.surface({ request }),
-        mt.probe([0.5, 0.5, 0.5], { request }),
-        mt.line([0, 0, 0], [1, 1, 1], { request }),
-      ]) {
+      for (const call of [mt.surface({ request }), mt.probe([0.5, 0.5, 0.5], { request }), mt.line([0, 0, 0], [1, 1, 1], { request })]) {
         assert.ok(await call);
       }
       await rejects(mt.surface({ request: /** @type {any} */ ({ eror: 1 }) }), "bad-option", /`eror`/);

@@ -26,7 +26,18 @@ const surface = {
 const part = (name, component, time) => ({ name: component === undefined ? `|${name}|` : `${name}_${"xyz"[component]}`, vector: { name, component }, time });
 /** A vector between scalars, its length, two time steps, and names that formats do not take. */
 const many = (count) =>
-  fieldsOf(count, { name: "x" }, part("u", 0), part("u", 1), part("u", 2), part("u"), { name: "T", time: 0.5 }, { name: "T", time: 2 }, { name: "a<b" }, { name: "a>b" });
+  fieldsOf(
+    count,
+    { name: "x" },
+    part("u", 0),
+    part("u", 1),
+    part("u", 2),
+    part("u"),
+    { name: "T", time: 0.5 },
+    { name: "T", time: 2 },
+    { name: "a<b" },
+    { name: "a>b" },
+  );
 
 /** The parts of a file as bytes. */
 const bytesOf = async (parts) => Buffer.from(await new Blob(parts).arrayBuffer());
@@ -91,9 +102,22 @@ test("meshes are saved with all fields: components as vectors, times in the name
   const { text, array } = arraysOf(await bytesOf(vtu(all, 7)));
   assert.match(text, /<PointData Scalars="a&#60;b">/);
   const names = [...text.slice(0, text.indexOf("</PointData>")).matchAll(/Name="([^"]*)" NumberOfComponents="(\d)"/g)].map(([, ...found]) => found);
-  assert.deepEqual(names, [["x", "1"], ["u", "3"], ["T@0.5", "1"], ["T@2.0", "1"], ["a&#60;b", "1"], ["a&#62;b", "1"]]);
+  assert.deepEqual(names, [
+    ["x", "1"],
+    ["u", "3"],
+    ["T@0.5", "1"],
+    ["T@2.0", "1"],
+    ["a&#60;b", "1"],
+    ["a&#62;b", "1"],
+  ]);
   assert.deepEqual(read(array("u"), 0, 15, "FloatLE"), vector);
-  for (const [name, index] of /** @type {[string, number][]} */ ([["x", 0], ["T@0.5", 5], ["T@2.0", 6], ["a&#60;b", 7], ["a&#62;b", 8]])) {
+  for (const [name, index] of /** @type {[string, number][]} */ ([
+    ["x", 0],
+    ["T@0.5", 5],
+    ["T@2.0", 6],
+    ["a&#60;b", 7],
+    ["a&#62;b", 8],
+  ])) {
     assert.deepEqual(read(array(name), 0, 5, "FloatLE"), values(index), name);
   }
   assert.doesNotMatch(arraysOf(await bytesOf(vtu(all, 2))).text, /Scalars/);
@@ -109,7 +133,8 @@ test("meshes are saved with all fields: components as vectors, times in the name
 });
 
 test("components of which one is missing, or that are named otherwise, stay scalars", async () => {
-  const namesOf = async (...fields) => [...arraysOf(await bytesOf(vtu({ ...mesh, fields: fieldsOf(5, ...fields) }, 0))).text.matchAll(/Name="([^"]*)"/g)].map(([, name]) => name).slice(0, -4);
+  const namesOf = async (...fields) =>
+    [...arraysOf(await bytesOf(vtu({ ...mesh, fields: fieldsOf(5, ...fields) }, 0))).text.matchAll(/Name="([^"]*)"/g)].map(([, name]) => name).slice(0, -4);
   assert.deepEqual(await namesOf(part("u", 0), part("u", 2), part("u")), ["u_x", "u_z", "|u|"]);
   assert.deepEqual(await namesOf({ ...part("u", 0), name: "ux" }, { ...part("u", 1), name: "uy" }), ["ux", "uy"]);
   assert.deepEqual(await namesOf(part("u", 0, 1), part("u", 1, 1), part("u", 0, 2), part("u", 1, 2)), ["u@1.0", "u@2.0"]);
@@ -141,10 +166,18 @@ test("PLY: all fields, with names that no other property has", async () => {
   const fields = many(4);
   const bytes = await bytesOf(ply({ ...surface, fields }));
   const end = bytes.indexOf("end_header\n") + "end_header\n".length;
-  const properties = [...bytes.subarray(0, end).toString().matchAll(/property float (\w+)/g)].map(([, name]) => name);
+  const properties = [
+    ...bytes
+      .subarray(0, end)
+      .toString()
+      .matchAll(/property float (\w+)/g),
+  ].map(([, name]) => name);
   assert.deepEqual(properties, ["x", "y", "z", "nx", "ny", "nz", "x_1", "u_x", "u_y", "u_z", "_u_", "T_0_5", "T_2_0", "a_b", "a_b_1"]);
   const last = read(bytes, end + 3 * 4 * properties.length, properties.length, "FloatLE");
-  assert.deepEqual(last.slice(6), fields.map(({ values }) => values[3]));
+  assert.deepEqual(
+    last.slice(6),
+    fields.map(({ values }) => values[3]),
+  );
 });
 
 test("glTF: the chunks hold what the accessors name", async () => {
@@ -167,7 +200,11 @@ test("glTF: the chunks hold what the accessors name", async () => {
 test("glTF: colours of vertices are linear light, on the scale of the legend", async () => {
   const legend = { range: /** @type {[number, number]} */ ([1, 100]), log: true, colours: ["#000000", "#ff8000", "#ffffff"] };
   const colours = coloursOf(Float64Array.of(-7, 1, 10, 100, 401), legend);
-  const near = (found, wanted) => assert.ok(wanted.every((x, i) => Math.abs(found[i] - x) < 1e-5), `${found}: ${wanted}`);
+  const near = (found, wanted) =>
+    assert.ok(
+      wanted.every((x, i) => Math.abs(found[i] - x) < 1e-5),
+      `${found}: ${wanted}`,
+    );
   near(colours, [0, 0, 0, 0, 0, 0, 1, 0.215861, 0, 1, 1, 1, 1, 1, 1]);
   // Half of the way in sRGB is a fifth of the light.
   near(coloursOf(Float32Array.of(0.5), { ...legend, range: [0, 1], log: false, colours: ["#000000", "#ffffff"] }), [0.214041, 0.214041, 0.214041]);
@@ -178,7 +215,17 @@ test("glTF: colours of vertices are linear light, on the scale of the legend", a
 });
 
 test("CSV: words with commas are in quotes, missing numbers are empty", async () => {
-  assert.equal((await bytesOf(csv([["a,b", 'c"d'], [1.5, undefined]]))).toString(), '"a,b","c""d"\n1.5,\n');
+  assert.equal(
+    (
+      await bytesOf(
+        csv([
+          ["a,b", 'c"d'],
+          [1.5, undefined],
+        ]),
+      )
+    ).toString(),
+    '"a,b","c""d"\n1.5,\n',
+  );
 });
 
 test("what is relative to an origin is saved in absolute numbers of double precision, or the origin with it", async () => {

@@ -46,7 +46,12 @@ const STEPS: [Step; 15] = [
     step("clippy", "lints of everything native", &["compile"], clippy),
     step("lint-wasm", "lints of everything for browsers", &["package"], lint_wasm),
     step("wasm", "the core and a WebGPU adapter in headless Chromium", &["compile"], wasm),
-    step("js", "lints and types of all JavaScript, and the package in Node", &["compile", "package"], js),
+    step(
+        "js",
+        "formatting, lints and types of all JavaScript, and the package in Node",
+        &["compile", "package"],
+        js,
+    ),
     step("workflows", "building in parts, with a process killed", &["compile"], workflows::test),
     step("doc", "documentation without broken links, and the public names of the crates", &["compile"], doc),
     step("consumer", "installing and type-checking the packed package", &["compile", "package"], consumer),
@@ -249,6 +254,8 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 
 fn js() -> Result<()> {
     package::ensure_built(package::Profile::Tested)?;
+    shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["format"]))?;
+    shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["format"]))?;
     shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["lint", "--error-on-warnings"]))?;
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js/tsconfig.page.json"]))?;

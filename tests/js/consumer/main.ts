@@ -70,7 +70,10 @@ local.free();
 const ended = AbortSignal.abort(new Error("enough"));
 const why: string[] = await Promise.all(
   [mt.refine({ error: 0 }, { signal: ended }), mt.isosurface(0.5, { signal: ended }), mt.surface({ signal: ended })].map((call) =>
-    call.then(() => "", (error: unknown) => String(error)),
+    call.then(
+      () => "",
+      (error: unknown) => String(error),
+    ),
   ),
 );
 

@@ -22,7 +22,10 @@ type Examples<T, Whole = T> = { [Name in keyof T]-?: Whole & Required<Pick<T, Na
 
 const MATRIX = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, -0.5, -0.5, 1, 1];
 const VIEW: ViewOptions = { matrix: MATRIX, viewport: [640, 480], pixels: 4 };
-const POINTS = [[0.2, 0, 0, 0, 0], [0.6, 1, 0, 0, 0.5]];
+const POINTS = [
+  [0.2, 0, 0, 0, 0],
+  [0.6, 1, 0, 0, 0.5],
+];
 
 const views: Examples<ViewOptions> = {
   matrix: { ...VIEW, matrix: { elements: new Float64Array(MATRIX) } },
@@ -44,7 +47,13 @@ const needs: Examples<Need> = {
   orientedBox: { error: "1%", orientedBox: { center: [0.5, 0.5, 0.5], halfAxes: [{ x: 0.1, y: 0.1, z: 0 }, [-0.1, 0.1, 0], [0, 0, 0.2]] } },
   halfSpace: { error: "1%", halfSpace: { normal: [1, 1, 0], offset: 0.5 } },
   slab: { error: "1%", slab: { normal: { x: 0, y: 0, z: 1 }, offset: 0.5, thickness: 0.01 } },
-  planes: { error: "1%", planes: [[1, 0, 0, 0.3], [0, 1, 0, 0.3]] },
+  planes: {
+    error: "1%",
+    planes: [
+      [1, 0, 0, 0.3],
+      [0, 1, 0, 0.3],
+    ],
+  },
   isovalues: { error: "1%", isovalues: new Float64Array([0.5]) },
   ranges: { error: "1%", ranges: [0.2, 0.3, 0.6, 0.7] },
   view: { view: VIEW },

@@ -48,7 +48,16 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   for (const request of requests) (await viewer.refine(request)) satisfies ViewerStats;
   const value: number = known.fields[0]?.min ?? 0;
   await viewer.set({ isosurfaces: [{ value, opacity: 0.5, edges: true }, { colour: "#ff0000" }, { field: "p" }] });
-  await viewer.set({ volume: { opacities: [[0, 0], [1, 0.5]], unitLength: 0.1, clipped: false } });
+  await viewer.set({
+    volume: {
+      opacities: [
+        [0, 0],
+        [1, 0.5],
+      ],
+      unitLength: 0.1,
+      clipped: false,
+    },
+  });
   await viewer.set({ slices: [{ ...half, opacity: 0.5, edges: true, field: "p", clipped: false }], clips: [half] });
   await viewer.set({ boundary: { opacity: 0.2, edges: true, colour: "#ffffff" }, clipBox: [0, 0, 0, 1, 1, 1] });
   await viewer.set({ cells: { shape: "wire", shrink: 0.2, cut: half, colourBy: "error", width: 2 } });
@@ -66,7 +75,13 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   [blocks?.bounds.length, blocks?.states[0]] satisfies (number | undefined)[];
   const [{ tets }, slice] = await Promise.all([viewer.mesh(), viewer.slice([0, 0, 1], 0.5)]);
   [tets, slice.indices] satisfies Uint32Array[];
-  const fast = await Viewer.create(canvas, { frameTime: Infinity, prefetch: "bucky.mt", workerUrl: "/viewer-worker.js", workerTimeoutMs: Number.POSITIVE_INFINITY, wasmUrl: new URL("https://example.org/v.wasm") });
+  const fast = await Viewer.create(canvas, {
+    frameTime: Infinity,
+    prefetch: "bucky.mt",
+    workerUrl: "/viewer-worker.js",
+    workerTimeoutMs: Number.POSITIVE_INFINITY,
+    wasmUrl: new URL("https://example.org/v.wasm"),
+  });
   fast.frameTime = 30;
   await Viewer.create(canvas, { worker: new Worker("/viewer-worker.js", { type: "module" }) });
   const found: Reading | undefined = await viewer.pick(0, 0);
