@@ -2,6 +2,6 @@
 
 /// An error that says in a word of what kind it is: the `code` of the errors of the JavaScript API.
 pub trait Coded: std::error::Error {
-    /// The word, such as `truncated`; `docs/api` of the package lists them.
+    /// The word, such as `truncated`; `ErrorCode` of the npm package lists them.
     fn code(&self) -> &'static str;
 }

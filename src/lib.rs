@@ -1,4 +1,5 @@
-//! **tetralod** brings very large tetrahedral volumes into a web page.
+//! **tetralod** brings very large tetrahedral volumes into a web page. This crate is its core: from the bytes of MT files to meshes, surfaces
+//! and numbers.
 //!
 //! A tetrahedral mesh with scalar fields becomes, once and offline, a 3D *Multi-Tessellation* (MT): a coarse
 //! base mesh plus a partially ordered set of local updates. A consumer streams it and extracts, at any moment,
@@ -8,11 +9,10 @@
 //!
 //! # From a mesh to a surface
 //! ```
-//! use std::ops::ControlFlow;
-//! use tetralod_build::{BuildConfig, build};
 //! use tetralod::format::{EncodeOptions, encode};
 //! use tetralod::refine::Request;
 //! use tetralod::session::Session;
+//! use tetralod_build::{BuildConfig, build};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A mesh: generated here; `tetralod_io::read` reads one from a file. Meshes in files often need repair.
@@ -46,27 +46,32 @@
 //! # }
 //! ```
 //!
-//! # Features
+//! # Crates and features
 //!
-//! The core (decoder, refinement, isosurfaces on the CPU) is always there and needs no I/O, no GPU and no JavaScript:
-//! `default-features = false` is enough for a program that shows MTs. Features add the rest:
+//! The core (decoder, encoder, refinement, isosurfaces on the CPU) needs no I/O, no GPU and no JavaScript, and is enough for a program that shows
+//! MTs. Crates of the same version add the rest:
 //!
-//! | feature | adds | for |
-//! |---|---|---|
-//! | `build` (default) | modules `io`, `generate`, `builder`, `measure`, `verify` | making MTs, natively or in wasm |
-//! | `http` | `stream::HttpSource` | MT files on servers, in native programs |
-//! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
-//! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |
-//! | `web` | module `web`: the JavaScript API, with `gpu` also the viewer, with `build` (`web-build`) the builder | `wasm32-unknown-unknown` |
+//! | crate | adds |
+//! |---|---|
+//! | `tetralod-build` | MTs of meshes, natively or in wasm; what measures and verifies them |
+//! | `tetralod-io` | exchange formats (with its feature `hdf5` also VTKHDF and Exodus), and volumes by formula |
+//! | `tetralod-render` | scenes and the renderer on wgpu: WebGPU in pages, Vulkan natively |
+//! | `tetralod-bench` | a benchmark on one thread |
+//! | `tetralod-cli` | the command `tetralod` |
 //!
-//! The command `tetralod` is a crate of its own, `tetralod-cli`.
+//! The JavaScript API is the npm package `tetralod`. This crate has two features:
+//!
+//! | feature | adds |
+//! |---|---|
+//! | `parallel` (default) | work on all cores, natively: checks of meshes and MTs, and builds |
+//! | `http` | `stream::HttpSource`: MT files on servers, in native programs |
 //!
 //! # Modules
 //!
 //! Bytes become an MT in [`format`](mod@format), requests become a mesh in [`refine`], slices of the mesh become
 //! surfaces in [`view`]; [`session`] holds the three together and is what most programs want. [`mt`] is the structure
-//! itself, [`mesh`] and [`geom`] are what it rests on, [`bench`](mod@bench) times it; [`stream`] brings byte ranges of files
-//! that are elsewhere, and [`client`] a session those that it needs. `ARCHITECTURE.md` has the graph;
+//! itself, [`mesh`] and [`geom`] are what it rests on; [`stream`] brings byte ranges of files that are elsewhere, [`remote`] a session
+//! those that it needs, and [`client`] does so for native programs. `ARCHITECTURE.md` has the way of the data;
 //! [`format`](mod@format) shows the specification of the file.
 //!
 //! # What holds

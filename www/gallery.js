@@ -1,6 +1,6 @@
 /**
  * The volumes of the page: a list of data sets and a gallery, from a file that whoever makes the volumes writes beside them. The
- * page looks for a new one now and then: large volumes may still be in the making.
+ * page looks for a new one when it gets the focus, and while a volume is being made.
  */
 
 import { $, dialog, element, input, select } from "./dom.js";

@@ -14,7 +14,8 @@
  * - `dom`, `format`: elements, and numbers as words
  *
  * What shows or uses a part of the state subscribes to it; what changes it, a control or the viewer, changes the store alone. So
- * the address, undo, the controls and the picture cannot disagree.
+ * the address, undo, the controls and the picture cannot disagree. A control that is part of the state has an entry in `state`. Types are
+ * checked strictly (`tests/js/tsconfig.page.json`).
  */
 
 import { attachBlockMap } from "./blockmap.js";

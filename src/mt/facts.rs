@@ -1,4 +1,6 @@
 //! What is known of an MT once all of its updates have been applied, so that it need not be found out again.
+//!
+//! A builder of half-edge MTs notes bounds, ranges and faults of the errors of its pages, and what the encoder asks of the reference mesh.
 
 use super::{CurrentMesh, Excess, MtInfo};
 use crate::mesh::Histogram;

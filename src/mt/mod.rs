@@ -4,6 +4,27 @@
 //! lives in memory alone and stores every tetrahedron, as the oracle of tests; [`VertexTreeMt`] has the nodes of the paper in the place of those of [`VertexMt`], to compare
 //! them. All are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
 //! are applied through the trait [`ApplyUpdates`].
+//!
+//! Each kind has a wing, and the paper's node code one that uses that of `vertex`; `mesh` and `pages` know none of them:
+//!
+//! | here | what it is |
+//! |---|---|
+//! | `traits` | [`MultiTessellation`] (what can be read), [`UpdatePages`] (what comes and goes), [`ApplyUpdates`] (`u+` and `u−`) |
+//! | `ids`, `info` | numbers of updates and vertices; kind, lattices and fields of an MT |
+//! | `mesh` | the current mesh: base mesh, tags, changed blocks, stars; it carries the state of a kind as a `KindState` without reading it |
+//! | `pages` | updates in pages, for the kinds that can come in parts |
+//! | `edge` | `store`; `predict` and `star` (residuals); `builder` (from plain vertex splits); `apply` |
+//! | `half_edge` | `store`; `star_code` (residuals of removers and inner faces); `scratch` (the star of an insertion, prediction of levels); `builder` (appends updates to the mesh of those before) over `batch` (codes the stars of many at a time), `forest` (near vertices) and `removers`; `from_explicit`; `apply` |
+//! | `vertex` | `store`, `limits`; `shape_code`, `cavity`, `cavity_fill`, `sphere_order`, `bit_string` (what an insertion removes); `tet_errors`; `growing` and `streaming` (while updates arrive); `from_explicit`; `apply` |
+//! | `vertex_tree` | the paper's node code [§5], in memory alone: `store` (what a node has, and what it cannot say), `tree_code` (the stream 0 / 10 / 11), `rebuild` (T_u from it); `from_explicit`; `apply` |
+//! | `explicit` | `store`, `face_occupancy`, `check`, `apply` |
+//! | `any` | [`Mt`], an MT of any kind; calls are dispatched by `enum_dispatch` |
+//! | `facts` | what is noted of a half-edge MT while it is made, for the encoder |
+//! | `convert`, `replay`, `stats`, `update_errors`, `exact`, `margins`, `ranks`, `error` | over all kinds |
+//!
+//! [`EdgeMt`] stores no DAG: parents and children follow from labels. In [`VertexMt`] and [`VertexTreeMt`] they follow from loops [§5]; these store
+//! no tetrahedra but those of the base mesh. [`ExplicitMt`] has a DAG, and is the form in which the builders of vertex-based MTs hand them over.
+//! Which update removes a tetrahedron of the current mesh follows from labels in edge-based MTs; in the others the mesh keeps it as a tag.
 
 // Before `any`: then `enum_dispatch` writes the calls there, and the traits need not know [`Mt`].
 mod traits;

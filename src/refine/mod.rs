@@ -26,8 +26,16 @@
 //! that of all updates above a threshold of excess, ties by their number; both decrease along the partial order. The
 //! threshold is the smallest one that fits: no mesh within the budget has a smaller largest excess.
 //!
-//! **Small changes.** Each verdict comes with a slack: how far the request may move before it can change. [`Front`]
-//! evaluates again only what has used up its slack, so that the cost of a request grows with what it changes.
+//! **Small changes.** [`LodCriterion`] splits each need into a few *atoms*: functions of one tetrahedron and of the error of its remover. Each
+//! verdict comes with a slack: how far the request may move, by [`Criterion::distance`], before it can change. [`Front`]
+//! evaluates again only what has used up its slack (`timing_wheel`): tetrahedra of the current mesh, which may have come to violate the
+//! request, and updates without children, which may not be needed any more. A tetrahedron that violates it forces its remover, parents
+//! first; an update that is not needed is undone, and its parents are evaluated (`converge`). So the cost of a request grows with what it
+//! changes. Uniform requests find their updates by error, in windows sorted by place (`uniform`, `sweep`). Budgets that are not large
+//! enough compare violations in two queues (`ranked`), at a cost that grows with the mesh.
+//!
+//! **Rounding** could break monotony where two values are equal: regions are widened for each update by a little more than for its
+//! children.
 //!
 //! **Missing updates.** Updates that have not arrived are ignored: the mesh is the smallest that satisfies the request
 //! with the others, and the outcome says whether more are needed. When updates arrive, the tetrahedra that they remove

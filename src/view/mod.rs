@@ -1,5 +1,6 @@
 //! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT; colours of values,
-//! ticks and axes.
+//! ticks and axes. Isosurfaces and sections are cut by one engine, `marching`, which follows the changes of a mesh by a copy of it
+//! (`mesh_snapshot`).
 
 mod axes;
 mod boundary;

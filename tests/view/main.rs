@@ -1,4 +1,4 @@
-//! Promises of what is shown: isosurfaces, slices and probes, on the CPU and with the feature `vulkan` on the GPU.
+//! Promises of what is shown: isosurfaces, slices and probes, on the CPU and on the GPU.
 
 mod by_ranges;
 mod cells;

@@ -42,8 +42,8 @@ usage: cargo xtask COMMAND
                                  volume is made in the background, unless with --small
   docs                           make the documentation's site in target/docs
   test [STEP...]                 every check, or the named steps; `test --list` names them
-  test --quick                   formatting, lints and native tests; not: other feature sets, documentation, the longest
-                                 tests, real data, JavaScript, wasm, browsers
+  test --quick                   formatting, lints and native tests; not: documentation, the longest tests, real data,
+                                 JavaScript, wasm, browsers
   release [vX.Y.Z]               check that everything can be published, as this version; publishes nothing
   random [MINUTES]               the tests with random inputs for 30 minutes, each time with another TETRALOD_SEED
   planted [WORD...]              plant faults in a copy of the library, all or those with a word in their names or files: a

@@ -35,6 +35,10 @@ const MODULES: [Module; 3] = [
 
 const BENCH: Module = Module { name: "tetralod_bench", package: "tetralod-web-bench" };
 
+/// What is published on crates.io.
+pub const PUBLISHED: [&str; 6] =
+    ["tetralod", "tetralod-io", "tetralod-build", "tetralod-render", "tetralod-bench", "tetralod-cli"];
+
 /// All crates that are for browsers alone.
 pub const CRATES: [&str; 5] =
     ["tetralod-web", MODULES[0].package, MODULES[1].package, MODULES[2].package, BENCH.package];

@@ -249,7 +249,6 @@ fn with_fixture(then: impl FnOnce() -> Result<()>) -> Result<()> {
 
 /// The tests find the fixture through this variable.
 fn fixture_env(command: &mut Command) -> &mut Command {
-    command.env("TETRALOD_FIXTURE", shell::root().join(fixture::FOLDER))
 }
 
 fn js() -> Result<()> {

@@ -1,4 +1,4 @@
-//! The volumes of the demo: how they are made, and the list of them that the page reads.
+//! The volumes of the demo: makes those of `xtask/volumes.json`, and writes the list of them that the page reads, `www/data/volumes.json`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -249,23 +249,6 @@ fn files() -> Vec<String> {
 }
 
 #[test]
-fn the_files_that_are_named_to_developers_exist() {
-    let files = files();
-    for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
-        let shown = content(page);
-        // The first piece is the text before the first backtick; from then on, pieces between two backticks and texts take turns.
-        let named = shown.split('`').skip(1).step_by(2).filter(|name| {
-            let ending = name.rsplit_once('.').map(|(_, ending)| ending);
-            ending.is_some_and(|ending| ["rs", "js", "ts", "wgsl", "md"].contains(&ending))
-                && !name.contains("NAME")
-        });
-        let missing: Vec<&str> =
-            named.filter(|name| !files.iter().any(|file| file.ends_with(&format!("/{name}")))).collect();
-        assert!(missing.is_empty(), "{page} names files that are not there: {missing:?}");
-    }
-}
-
-#[test]
 fn what_the_readme_links_to_is_in_the_package() {
     let listed = Command::new(env!("CARGO"))
         .args(["package", "--list", "--allow-dirty", "--offline", "--package", "tetralod"])

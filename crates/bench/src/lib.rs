@@ -1,5 +1,10 @@
-//! How fast this machine decodes, refines, coarsens and cuts an MT, on one thread. The clock comes from outside, so
-//! that the same code runs natively and in a browser.
+//! A benchmark of [`tetralod`]: how fast this machine decodes, refines, coarsens and cuts an MT, on one thread. The clock comes from outside,
+//! so that the same code runs natively and in a browser.
+
+/// The code of README.md, as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod clock;
 mod coherent;

@@ -1,4 +1,4 @@
-//! From a tetrahedral mesh to a Multi-Tessellation, offline.
+//! Builds Multi-Tessellations of tetrahedral meshes, offline, for [`tetralod`]; measures them, and checks all that they promise.
 //!
 //! [`build`] makes an MT of any kind by any method that goes with it: see [`Method`]. The default,
 //! [`Method::Decimate`], collapses vertices onto neighbours in rounds of removals that do not depend on each other; the
@@ -24,6 +24,11 @@
 
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
+
+/// The code of README.md, as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod build_error;
 mod change;

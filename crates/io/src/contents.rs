@@ -7,8 +7,8 @@ use tetralod::mesh::{Field, Grid};
 /// What a file says that it contains. The data may be damaged even so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, or with the feature `formats`
-    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
+    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, natively also
+    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, and with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
     pub format: &'static str,
     /// The number of points.
     pub points: u64,

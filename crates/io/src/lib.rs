@@ -1,4 +1,6 @@
-//! Exchange formats: meshes and grids from files, and back to VTK.
+//! Reads and writes exchange formats for [`tetralod`]: meshes and grids from files, and back to VTK; and makes volumes by formula.
+//!
+//! Formats with "native" are not read in WebAssembly. Those with "`hdf5`" need that feature, too.
 //!
 //! | format | ending | read | written |
 //! |---|---|---|---|
@@ -6,16 +8,16 @@
 //! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
 //! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured, structured and rectilinear grids, structured points | |
 //! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
-//! | VTK XML, each of these in several files | `.pvtu`, `.pvti`, `.pvtr`, `.pvts` | by [`read`]; feature `formats` | |
+//! | VTK XML, each of these in several files | `.pvtu`, `.pvti`, `.pvtr`, `.pvts` | by [`read`]; native | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
-//! | Gmsh, versions 2 to 4.1 | `.msh` | text and binary; feature `formats` | |
-//! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; feature `formats` | |
-//! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
-//! | Netgen | `.vol` | feature `formats` | |
-//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal; feature `formats` | |
-//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text; feature `formats` | |
-//! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; feature `hdf5` | |
-//! | Exodus II | `.exo`, `.ex2`, `.e` | feature `hdf5` | |
+//! | Gmsh, versions 2 to 4.1 | `.msh` | text and binary; native | |
+//! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; native | |
+//! | TetGen | `.node` + `.ele` | by [`read`]; native | |
+//! | Netgen | `.vol` | native | |
+//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal; native | |
+//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text; native | |
+//! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; native, `hdf5` | |
+//! | Exodus II | `.exo`, `.ex2`, `.e` | native, `hdf5` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |
@@ -28,10 +30,16 @@
 //! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
 //! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`].
 //! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
-//! volume are left out beside them. Readers check the file, not the mesh: see [`tetralod::mesh::repair`].
+//! volume are left out beside them. How cells are split is in `cell_shapes`. Readers check the file, not the mesh: see
+//! [`tetralod::mesh::repair`]. Meshes in several files can be read one piece at a time: `Pieces`.
 
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
+
+/// The code of README.md, as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod beside;
 mod cell_shapes;

@@ -1,4 +1,4 @@
-//! Draws meshes of [`tetralod`] with wgpu: on WebGPU in pages, on Vulkan natively.
+//! Draws the meshes of [`tetralod`] with wgpu: on WebGPU in pages, on Vulkan natively.
 //!
 //! [`scene::Scene`] makes of a session's mesh and of plain data ([`scene::SceneState`]) what is to be drawn, and [`gpu::Renderer`] draws it.
 

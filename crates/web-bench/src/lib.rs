@@ -1,4 +1,4 @@
-//! The benchmark of the command line, for the browser: `cargo xtask bench --browser` sets both side by side.
+//! A wasm module with the benchmark of the command, for browsers; it is not in the npm package. `cargo xtask bench --browser` sets both side by side.
 
 use serde::Serialize;
 use tetralod_bench::{self as bench, BenchReport, Coherent};

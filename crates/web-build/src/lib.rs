@@ -1,5 +1,5 @@
-//! The class that builds MT files in a page: files of a mesh go in, the bytes of an MT file come out. All of it happens in one call
-//! on one thread, so JavaScript puts it into a worker of its own and ends that to stop the work.
+//! The wasm module `build` of the npm package: the class that builds MT files in a page. Files of a mesh go in, the bytes of an MT file
+//! come out. All of it happens in one call on one thread, so JavaScript puts it into a worker of its own and ends that to stop the work.
 
 mod memory;
 mod options;

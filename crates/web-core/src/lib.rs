@@ -1,4 +1,4 @@
-//! The class that the package's worker holds: one MT being decoded, and its current mesh.
+//! The wasm module `core` of the npm package: the class that its worker holds, with one MT being decoded, and its current mesh.
 
 use tetralod::mt::{MeshChanges, MtInfo};
 use tetralod::session::Session;

@@ -1,4 +1,5 @@
-//! The class that the viewer's worker holds: a session, a renderer on a canvas, and what the user has set.
+//! The wasm module `viewer` of the npm package: the class that the viewer's worker holds, with a session, a renderer on
+//! a canvas, and what the user has set.
 //!
 //! Nothing is computed before it is drawn: setters only note what is out of date, [`Viewer::frame`] brings it up to
 //! date and draws if anything has changed. The mesh follows what is asked for in short steps between the frames

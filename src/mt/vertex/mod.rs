@@ -1,4 +1,7 @@
 //! Vertex-based Multi-Tessellations [§2.2, §5]: updates are vertex insertions, their inverses vertex removals.
+//!
+//! Files code insertions relative to the mesh of all updates before them, so they are read from front to back. What a node keeps in memory is not
+//! in the file. `docs/paper.md` has the bits of these nodes beside those of the paper ([`VertexTreeMt`](crate::mt::VertexTreeMt)).
 
 pub(super) mod apply;
 pub(super) mod bit_string;

@@ -1,4 +1,7 @@
 //! One MT of the updates of all parts.
+//!
+//! Each node has ordered its own updates into blocks. They are numbered from the last node down to the parts, which extends the partial order, and
+//! appended one by one, as for a whole.
 
 use super::PartsError;
 use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};

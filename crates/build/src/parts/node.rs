@@ -1,4 +1,6 @@
 //! One step: the mesh of a part, or of several that are joined, is simplified as far as its place in the whole allows.
+//!
+//! A part is decimated like a whole, but for its open vertices, and until an eighth of its tetrahedra is left.
 
 use super::PartsError;
 use super::piece::{Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};

@@ -1,4 +1,8 @@
 //! What is left of a part of the domain, and the updates that were made of the rest: what steps hand to each other.
+//!
+//! What is left travels with all of its reference vertices, the buckets they are in, the errors and the numbers of the updates that made each
+//! tetrahedron, and the boundary of the reference mesh: so a node that joins eight of them goes on as if nothing had happened, errors stay exact
+//! and monotone, and one part alone gives the bytes of a whole.
 
 use super::PartsError;
 use super::plan::{Node, Plan};
@@ -62,7 +66,7 @@ pub(super) struct Piece {
     /// The updates that are the inverses of what made tetrahedra, and their errors, field by field.
     pub earlier: Vec<Made>,
     pub earlier_errors: Vec<u16>,
-    /// Points that are in buckets, and of which tetrahedron: see `builder::cost`.
+    /// Points that are in buckets, and of which tetrahedron: see `error::cost`.
     pub inside: Vec<(u32, u32)>,
     pub border: Vec<(u32, u32)>,
     pub foreign: Vec<(u32, u32)>,
@@ -74,7 +78,7 @@ pub(super) struct Piece {
     pub regions: Vec<u32>,
     /// Points that stay where they are, ascending.
     pub kept: Vec<u32>,
-    /// How far the removal of each vertex reaches, once the part has been built: see `builder::reach`.
+    /// How far the removal of each vertex reaches, once the part has been built: see `order::reach`.
     pub reaches: Vec<(u32, [[i32; 3]; 2])>,
 }
 

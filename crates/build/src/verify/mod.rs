@@ -29,6 +29,8 @@
 //! - **Steps**: between them the mesh is valid and within the budget.
 //!
 //! [`run_shown`] checks what a session makes of its meshes.
+//!
+//! Files that are too large for all that are checked by [`samples()`]: single requests, against the input near them.
 
 mod case;
 mod deviation;

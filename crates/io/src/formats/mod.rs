@@ -1,4 +1,4 @@
-//! Formats of meshers, of imaging and in HDF5, which the builder in pages does not have (features `formats` and `hdf5`).
+//! Formats of meshers, of imaging and in HDF5, which only native programs read.
 //!
 //! Each is recognised by its first words, but for TetGen's, whose files are lists of numbers.
 

@@ -161,7 +161,7 @@ fn surface(
 
 fn instance() -> Result<wgpu::Instance, GpuError> {
     if wgpu::Instance::enabled_backend_features().is_empty() {
-        let why = "this build has no backend for this platform (feature `vulkan` adds one)";
+        let why = "this build has no backend of wgpu for this platform";
         return Err(GpuError::NoAdapter(why.to_owned()));
     }
     Ok(wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle()))
