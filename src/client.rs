@@ -11,6 +11,7 @@ use crate::stream::{RangeSource, StreamError, WantedRange};
 use std::time::Duration;
 use thiserror::Error;
 
+#[doc(hidden)]
 pub use crate::remote::Step;
 
 /// How a client works.

@@ -156,6 +156,7 @@ pub mod geom;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
+#[doc(hidden)]
 pub mod remote;
 pub mod session;
 pub mod stream;

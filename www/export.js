@@ -2,7 +2,7 @@
 
 import { absolute } from "tetralod/viewer";
 import { compose } from "./compose.js";
-import { $, all, button, input, select } from "./dom.js";
+import { $, all, button, element, input, select } from "./dom.js";
 import { isovalue, shownField } from "./fields.js";
 import { count } from "./format.js";
 import { showIdle } from "./idle.js";
@@ -16,9 +16,7 @@ import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "./writers.js";
 
 /** @param {string} name @param {BlobPart[]} parts @param {string} type */
 function saveAs(name, parts, type) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob(parts, { type }));
-  link.download = name;
+  const link = element("a", { href: URL.createObjectURL(new Blob(parts, { type })), download: name });
   link.click();
   // Once the browser has begun to save it.
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);

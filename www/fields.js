@@ -89,8 +89,6 @@ function showField() {
   if (!demo.info) return;
   const { field, time } = store.state;
   select("field").value = field;
-  select("surface-colour").value = store.state["surface-colour"];
-  select("vector").value = store.state.vector;
   input("time").max = String(stepsOf(field).length - 1);
   input("time").value = String(time);
   $("time-row").hidden = stepsOf(field).length < 2;
@@ -110,9 +108,8 @@ export function attachFields() {
     // A range that was typed is one of the field before.
     store.change({ field: select("field").value, range: Array.isArray(range) ? "data" : range });
   });
-  for (const id of /** @type {const} */ (["surface-colour", "vector"])) select(id).addEventListener("input", () => store.change({ [id]: select(id).value }));
   input("time").addEventListener("input", () => store.change({ time: input("time").valueAsNumber }));
   input("isovalue").addEventListener("input", () => setIsovalue(input("isovalue").valueAsNumber / 1000));
-  store.subscribe(["field", "time", "surface-colour", "vector"], showField);
+  store.subscribe(["field", "time"], showField);
   store.subscribe(["field", "time", "isovalue"], showIsovalue);
 }

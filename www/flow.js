@@ -1,7 +1,7 @@
 /** The settings of the flow: streamlines and arrows of a vector field, and where streamlines start. */
 
-import { $, input, text } from "./dom.js";
-import { demo, page, volume } from "./page.js";
+import { $, text } from "./dom.js";
+import { page, volume } from "./page.js";
 import { seedPlane } from "./planes.js";
 import { store } from "./state.js";
 import { vectors } from "./volume.js";
@@ -61,17 +61,8 @@ function rake() {
   );
 }
 
-/** Shows whether the volume has vectors at all. */
-function showVectors() {
-  if (!demo.info) return;
-  const hasNone = vectors().size === 0;
-  input("flow").disabled = hasNone;
-  $("flow-label").title = hasNone ? "This dataset has no vectors" : "";
-}
-
 export function attachFlow() {
   $("no-seeds").addEventListener("click", () => store.change({ seeds: [] }));
-  store.subscribe(["vector"], showVectors);
   store.subscribe(["rake", "seeds"], () => {
     const { rake, seeds } = store.state;
     text("rake", rake === 0 ? "none" : `${rake} × ${rake}`);

@@ -93,10 +93,7 @@ export const undo = () => step(past, future);
 export const redo = () => step(future, past);
 
 /** Shows the volume as it is by default. */
-function reset() {
-  const url = sourceWords();
-  restore(url ? { url } : {});
-}
+const reset = () => restore({ url: sourceWords() });
 
 /** Copies the address of the page, which has its whole state. */
 export async function share() {

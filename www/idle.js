@@ -19,6 +19,7 @@ function reasons() {
   const isWhole = demo.info !== undefined && !demo.blocks && "This file comes as a whole, not in blocks";
   const isDifference = comparison()?.difference && "Differences have colours and a range of their own";
   const isSolid = mode() !== "mesh" || store.state.shape === "solid";
+  const noVectors = vectors().size === 0 && "This dataset has no vectors";
   const none = "There is no probe: click on the picture first";
   return {
     shrink: !isSolid && "Only solids are shrunk",
@@ -29,7 +30,8 @@ function reasons() {
     "range-preset": isDifference,
     "range-low": isDifference,
     "range-high": isDifference,
-    "also-flow": vectors().size === 0 && "This dataset has no vectors",
+    flow: noVectors,
+    "also-flow": noVectors,
     "map-blocks": isWhole,
     "map-missing": isWhole,
     csv: store.state.probes.length === 0 && none,

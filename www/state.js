@@ -17,11 +17,11 @@ import { fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js";
 /** The values of the first and the last colour. @typedef {"data" | "percentiles" | "symmetric" | [low: number, high: number]} Range */
 /** @typedef {Record<string, string>} Words */
 
-/** Controls that have a value of their own, which no volume takes away: they are bound to it by their ids. Those that compare meshes have no entry. */
+/** Controls that have a value of their own: they are bound to it by their ids. Those that compare meshes have no entry. */
 const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
   ["outline", "inside", "arrows", "flow-boundary", "reversed", "log", "flip", "focus", "axes", "fly", "freeze", "difference"],
   ["shrink", "shade", "rake", "pixels", "budget", "frame-time", "split"],
-  ["shape", "colour-by", "flow-colour", "map", "axis", "region", "background"],
+  ["shape", "colour-by", "flow-colour", "map", "axis", "region", "background", "surface-colour", "vector"],
 ]);
 
 /**
@@ -32,8 +32,6 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
  * @property {Record<string, boolean>} edges
  * @property {string} field
  * @property {number} time its step
- * @property {string} surface-colour
- * @property {string} vector
  * @property {number | undefined} isovalue in units of the field; the middle of its range without it
  * @property {{ cut: number, section: number }} places of the planes, in thousandths of the model's length
  * @property {"field" | "view"} refine
@@ -301,13 +299,12 @@ const ENTRIES = {
   },
 };
 
-/** What there is first of what no volume changes. @type {Omit<Others, "field" | "vector" | "box">} */
+/** What there is first of what no volume changes. @type {Omit<Others, "field" | "box">} */
 const FIRST = {
   view: /** @type {Mode} */ (loadedChoice("mode")),
   also: [],
   opacities: Object.fromEntries(SHEER.map((name) => [name, OPAQUE])),
   edges: EDGES,
-  "surface-colour": "",
   time: 0,
   isovalue: undefined,
   places: { cut: MIDDLE, section: MIDDLE },
@@ -323,7 +320,7 @@ const FIRST = {
 
 /** The one that the page has. @type {Store<State>} */
 export const store = new Store(
-  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", vector: "", box: [0, 0, 0, 1, 1, 1], playing: false, dark: true, kept: false }),
+  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", box: [0, 0, 0, 1, 1, 1], playing: false, dark: true, kept: false }),
   settled,
 );
 

@@ -3,6 +3,7 @@
  * keeps it in the browser. Until then there is a drawing.
  */
 
+import { element } from "./dom.js";
 import { demo, viewer } from "./page.js";
 
 const KEY = "tetralod-picture ";
@@ -45,15 +46,9 @@ export async function takePicture(volume) {
   await new Promise((resolve) => setTimeout(resolve, REST));
   if (info !== demo.info || demo.state !== "complete") return false;
   const image = await createImageBitmap(await viewer().screenshot({ ...SIZE, background: "dark" }));
-  const canvas = new OffscreenCanvas(SIZE.width, SIZE.height);
+  const canvas = element("canvas", { width: SIZE.width, height: SIZE.height });
   canvas.getContext("2d")?.drawImage(image, 0, 0);
-  const blob = await canvas.convertToBlob({ type: "image/webp", quality: 0.8 });
-  /** @type {string} */
-  const text = await new Promise((resolve, reject) => {
-    const reader = new FileReader();
-    Object.assign(reader, { onload: () => resolve(String(reader.result)), onerror: () => reject(reader.error) });
-    reader.readAsDataURL(blob);
-  });
+  const text = canvas.toDataURL("image/webp", 0.8);
   try {
     localStorage.setItem(`${KEY}${volume.url} ${volume.bytes}`, text);
     return true;

@@ -96,7 +96,8 @@ pub enum EncodeError {
     Write(#[source] io::Error),
 }
 
-/// The bytes of an MT file. Its blocks, the least that a client can fetch by itself, are the pages of the MT: see [`Mt::in_pages`].
+/// The bytes of an MT file, in blocks as large as [`Mt::in_pages`] has made them: those of a half-edge MT are its pages, and what a client
+/// can fetch by itself.
 ///
 /// # Errors
 /// If the MT is not complete, or could not be read back.

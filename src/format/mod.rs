@@ -18,9 +18,15 @@ mod read;
 mod section;
 mod write;
 
-pub use decode::{DecodeOptions, Decoder, ErrorBytes, ExactStatus, Progress};
-pub use encode::{EncodeError, EncodeOptions, breakdown, encode, encode_to};
+pub use decode::DecodeOptions;
+#[doc(hidden)]
+pub use decode::{Decoder, ErrorBytes, ExactStatus, Progress};
+#[doc(hidden)]
+pub use encode::breakdown;
+pub use encode::{EncodeError, EncodeOptions, encode, encode_to};
 pub use error::FormatError;
 pub use limits::Limits;
+#[doc(hidden)]
 pub use payload::exact::Corrections;
+#[doc(hidden)]
 pub use payload::index::{BlockInfo, Index};

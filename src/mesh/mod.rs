@@ -24,11 +24,15 @@ mod tet_mesh;
 #[doc(hidden)]
 pub use adjacency::DisjointSets;
 #[doc(hidden)]
+pub use adjacency::neighbors;
+#[doc(hidden)]
 pub use adjacency::{FaceTable, boundary_faces, match_faces};
-pub use adjacency::{Topology, neighbors, topology};
+#[doc(hidden)]
+pub use adjacency::{Topology, topology};
 #[doc(hidden)]
 pub use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
+#[doc(hidden)]
 pub use check::check;
 #[doc(hidden)]
 pub use check::check_arrays;
@@ -36,21 +40,30 @@ pub use check::check_arrays;
 pub use check::check_topology;
 pub use error::MeshError;
 pub use field::{Field, VectorPart};
+#[doc(hidden)]
 pub use geometry_field::GeometryField;
 #[doc(hidden)]
 pub use grow::growth_order;
 pub(crate) use grow::{Gate, Growth};
+#[doc(hidden)]
 pub use histogram::Histogram;
 pub(crate) use histogram::{Sum, volume_of};
+#[doc(hidden)]
 pub use input::{CellNumbers, InputCell, MeshInput, Note, SourceFiles};
+#[doc(hidden)]
 pub use kuhn::kuhn_tets;
+#[doc(hidden)]
 pub use layered_grid::{GridArray, LayeredGrid};
 #[doc(hidden)]
 pub use middles::Middles;
+#[doc(hidden)]
 pub use piece::MeshPiece;
 pub use repair::{MeshFindings, RepairLevel, RepairReport, findings, repair, repair_at};
+#[doc(hidden)]
 pub use series::StepError;
 #[doc(hidden)]
 pub use straighten::straighten;
-pub use tet::{EDGES, FACES, MAX_TETS, NONE};
+#[doc(hidden)]
+pub use tet::{EDGES, MAX_TETS};
+pub use tet::{FACES, NONE};
 pub use tet_mesh::{Grid, TetMesh};

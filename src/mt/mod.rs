@@ -51,38 +51,65 @@ mod vertex;
 mod vertex_tree;
 
 pub use any::Mt;
+#[doc(hidden)]
 pub use convert_error::ConvertError;
+#[doc(hidden)]
 pub use edge::builder::EdgeMtBuilder;
-pub use edge::store::{EdgeMt, EdgeUpdate, MAX_EDGE, VertexSplit};
-pub use error::{ErrorCode, MAX_QUARTERINGS, PageError, UpdateError};
+pub use edge::store::EdgeMt;
+#[doc(hidden)]
+pub use edge::store::{EdgeUpdate, MAX_EDGE, VertexSplit};
+pub use error::{ErrorCode, UpdateError};
+#[doc(hidden)]
+pub use error::{MAX_QUARTERINGS, PageError};
+#[doc(hidden)]
 pub use exact::{Exact, ExactValues};
+#[doc(hidden)]
 pub use explicit::check::MtFault;
+#[doc(hidden)]
 pub use explicit::check::check_errors;
-pub use explicit::store::{ExplicitMt, ExplicitUpdate};
+pub use explicit::store::ExplicitMt;
+#[doc(hidden)]
+pub use explicit::store::ExplicitUpdate;
 pub(crate) use facts::{MtFacts, VOLUME_BINS, level_volumes};
 #[doc(hidden)]
 pub use half_edge::builder::{Forest, HalfEdgeBuilder, NextUpdate};
 #[doc(hidden)]
 pub use half_edge::removers::by_corner;
-pub use half_edge::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
-pub use ids::{Applied, UpdateId, VertexId};
+pub use half_edge::store::HalfEdgeMt;
+#[doc(hidden)]
+pub use half_edge::store::{BaseMark, ForestChild, HalfEdgeUpdate};
+pub use ids::UpdateId;
+#[doc(hidden)]
+pub use ids::{Applied, VertexId};
 pub use info::{FieldInfo, MtInfo, MtKind};
 #[doc(hidden)]
 pub use margins::{Excess, Margins};
+#[doc(hidden)]
 pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 #[doc(hidden)]
 pub use mesh::current::mix;
 pub use mesh::current::{CurrentMesh, MeshChanges};
+#[doc(hidden)]
 pub use mesh::limits::{MAX_LINK, MAX_STAR};
 pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
+#[doc(hidden)]
 pub use replay::ReplayError;
 #[doc(hidden)]
 pub use replay::canonical;
+#[doc(hidden)]
 pub use stats::{MtStats, stats};
-pub use traits::{ApplyUpdates, LookAtTet, MultiTessellation, UpdatePages};
+pub use traits::{ApplyUpdates, MultiTessellation};
+#[doc(hidden)]
+pub use traits::{LookAtTet, UpdatePages};
+#[doc(hidden)]
 pub use vertex::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
-pub use vertex::store::{NodeBits, VertexMt};
+#[doc(hidden)]
+pub use vertex::store::NodeBits;
+pub use vertex::store::VertexMt;
 pub(crate) use vertex::streaming::Insertion;
+#[doc(hidden)]
 pub use vertex_tree::rebuild::MOST_TRIES;
-pub use vertex_tree::store::{MostNeighbors, TreeExceptions, VertexTreeMt};
+pub use vertex_tree::store::VertexTreeMt;
+#[doc(hidden)]
+pub use vertex_tree::store::{MostNeighbors, TreeExceptions};

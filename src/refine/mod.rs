@@ -65,13 +65,21 @@ mod tet_minimax;
 mod timing_wheel;
 mod uniform;
 
-pub use criterion::{ANY, COMPONENTS, Criterion, TetData, Tolerance, Verdict};
+#[doc(hidden)]
+pub use criterion::{ANY, COMPONENTS, Tolerance};
+pub use criterion::{Criterion, TetData, Verdict};
+#[doc(hidden)]
 pub use custom::Custom;
-pub use front::{Front, GoOn, Outcome};
+#[doc(hidden)]
+pub use front::Front;
+#[doc(hidden)]
+pub use front::{GoOn, Outcome};
+#[doc(hidden)]
 pub use lod_criterion::LodCriterion;
 pub use request::{Budget, Need, Part, Region, Request, RequestError, Transfer, Values, View};
 
 /// The most planes that a [`Region::Convex`] can have.
+#[doc(hidden)]
 pub const MAX_PLANES: usize = 16;
 
 /// The work of a refinement, and the quality of the mesh.

@@ -17,8 +17,11 @@ mod pieces;
 mod quantity;
 mod reading;
 
+#[doc(hidden)]
 pub use blocks::{BlockProgress, BlockState, MappedBlock, WantedBytes};
+#[doc(hidden)]
 pub use quantity::TetQuantity;
+#[doc(hidden)]
 pub use reading::Reading;
 
 use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError, Limits};
@@ -36,6 +39,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 pub use crate::format::Progress;
+#[doc(hidden)]
 pub use crate::refine::GoOn;
 
 /// Why a session cannot do what it was asked for. The current mesh is valid all the same.

@@ -16,6 +16,10 @@ mod source;
 pub use error::StreamError;
 #[cfg(feature = "http")]
 pub use http::{CacheFolder, HttpOptions, HttpSource};
+#[doc(hidden)]
 pub use loader::{Action, Failure, Loader, LoaderOptions, Traffic, WantedRange};
+#[doc(hidden)]
 pub use response::ResponseHead;
-pub use source::{Arrived, FileSource, RangeSource};
+#[doc(hidden)]
+pub use source::Arrived;
+pub use source::{FileSource, RangeSource};

@@ -8,6 +8,7 @@ mod clip;
 mod colormap;
 mod colour_scale;
 mod difference;
+#[doc(hidden)]
 pub mod gizmo;
 mod glyphs;
 mod iso;
@@ -24,27 +25,50 @@ mod triangles;
 mod tubes;
 mod volume;
 
+#[doc(hidden)]
 pub use crate::mesh::Histogram;
+#[doc(hidden)]
 pub use axes::{AxisTick, BoxAxis, BoxEdge, ScaleBar, box_axis, scale_bar, tick_edges};
-pub use boundary::{BoundarySurface, area, is_closed};
+pub use boundary::BoundarySurface;
+#[doc(hidden)]
+pub use boundary::{area, is_closed};
 pub use clip::ClipPlane;
+pub use colormap::Colormap;
+#[doc(hidden)]
 pub use colormap::{
-    BALANCE, BATLOW, CIVIDIS, COOLWARM, Colormap, GREY, HALINE, ICE, INFERNO, LAJOLLA, LAPAZ, MAGMA, OSLO,
-    PLASMA, ROMA, THERMAL, TURBO, VIK, VIRIDIS,
+    BALANCE, BATLOW, CIVIDIS, COOLWARM, GREY, HALINE, ICE, INFERNO, LAJOLLA, LAPAZ, MAGMA, OSLO, PLASMA,
+    ROMA, THERMAL, TURBO, VIK, VIRIDIS,
 };
-pub use colour_scale::{ColourScale, ScaleError};
+pub use colour_scale::ColourScale;
+#[doc(hidden)]
+pub use colour_scale::ScaleError;
+#[doc(hidden)]
 pub use difference::Difference;
-pub use glyphs::{ArrowLength, ArrowOptions};
+#[doc(hidden)]
+pub use glyphs::ArrowLength;
+pub use glyphs::ArrowOptions;
 pub use iso::{IsoSurface, NormalKind};
+#[doc(hidden)]
 pub use pick::{MediumHit, SurfaceHit, first_hit, first_hit_in};
-pub use probe::{Place, Probe, Span};
+pub use probe::Probe;
+#[doc(hidden)]
+pub use probe::{Place, Span};
 pub use slice::{Plane, Slice};
+#[doc(hidden)]
 pub use solids::Solids;
 pub use stats::FieldStats;
-pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
+#[doc(hidden)]
+pub use stream::Tracer;
+#[doc(hidden)]
+pub use stream::{StreamEnd, StreamPoint};
+pub use stream::{Streamline, TraceOptions};
+#[doc(hidden)]
 pub use ticks::{Tick, end_ticks, linear_ticks, log_ticks};
 pub use triangles::Triangles;
-pub use tubes::{TubeEnd, TubeOptions};
+#[doc(hidden)]
+pub use tubes::TubeEnd;
+pub use tubes::TubeOptions;
+#[doc(hidden)]
 pub use volume::{Light, Medium};
 
 use crate::geom::Bounds;

@@ -246,7 +246,7 @@ impl Files {
         let mut module = Module::new();
         for (i, word) in path.iter().enumerate() {
             let (file, rest) = (&self.0[&module], &path[i + 1..]);
-            let inner = [module.as_slice(), &[word.clone()]].concat();
+            let inner = [module.as_slice(), std::slice::from_ref(word)].concat();
             let is_module = file.children.contains(word) && self.0.contains_key(&inner);
             if is_module && !rest.is_empty() {
                 module = inner;

@@ -43,10 +43,6 @@ pub const PUBLISHED: [&str; 6] =
 pub const CRATES: [&str; 5] =
     ["tetralod-web", MODULES[0].package, MODULES[1].package, MODULES[2].package, BENCH.package];
 
-/// What is published on crates.io.
-pub const PUBLISHED: [&str; 6] =
-    ["tetralod", "tetralod-io", "tetralod-build", "tetralod-render", "tetralod-bench", "tetralod-cli"];
-
 /// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.
 const WASM_FEATURES: [&str; 6] = [
     "--enable-bulk-memory",

@@ -249,11 +249,11 @@ fn with_fixture(then: impl FnOnce() -> Result<()>) -> Result<()> {
 
 /// The tests find the fixture through this variable.
 fn fixture_env(command: &mut Command) -> &mut Command {
+    command.env("TETRALOD_FIXTURE", shell::root().join(fixture::FOLDER))
 }
 
 fn js() -> Result<()> {
     package::ensure_built(package::Profile::Tested)?;
-    shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["format"]))?;
     shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["format"]))?;
     shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["lint", "--error-on-warnings"]))?;
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;

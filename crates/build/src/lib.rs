@@ -39,10 +39,12 @@ mod error;
 mod geometry;
 mod insert;
 mod lattice;
+#[doc(hidden)]
 pub mod measure;
 mod memory;
 mod method;
 mod order;
+#[doc(hidden)]
 pub mod parts;
 mod progress;
 mod remedy;
@@ -55,13 +57,19 @@ use decimate::Decimated;
 use decimate::collapses::Collapses;
 
 pub use build_error::BuildError;
+#[doc(hidden)]
 pub use collapse::edge_mt;
 pub use config::{BuildConfig, FieldPrecision};
+#[doc(hidden)]
 pub use geometry::delaunay::delaunay;
 pub use memory::memory_needed;
+#[doc(hidden)]
 pub use memory::{memory_needed_in_parts, memory_needed_in_pieces};
-pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
+#[doc(hidden)]
+pub use method::ConstructionChoice;
+pub use method::{BuildCriterion, Construction, Method, Purpose, VertexMethod};
 pub use progress::{BuildProgress, OnProgress};
+#[doc(hidden)]
 pub use remedy::Remedy;
 pub use result::{BuildResult, BuildSummary};
 

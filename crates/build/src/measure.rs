@@ -10,6 +10,7 @@
 
 mod angles;
 
+#[doc(hidden)]
 pub use angles::{CellAngles, CellsBelow};
 
 use glam::DVec3;
@@ -19,6 +20,7 @@ use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo};
 
 /// The vertices and one field of the mesh that an MT was built from.
 #[derive(Clone, Copy, Debug)]
+#[doc(hidden)]
 pub struct Reference<'a> {
     /// Points in model units.
     pub positions: &'a [[f64; 3]],
@@ -30,6 +32,7 @@ pub struct Reference<'a> {
 
 /// Where to measure.
 #[derive(Clone, Debug, Default)]
+#[doc(hidden)]
 pub struct Part {
     /// Only at vertices in this box.
     pub roi: Option<Bounds>,
@@ -41,6 +44,7 @@ pub struct Part {
 
 /// What an MT promises of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[doc(hidden)]
 pub struct Promise {
     /// Largest difference of the field, in field units.
     pub field: f64,
@@ -66,6 +70,7 @@ const ROUNDING: f64 = 1.000_01;
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[doc(hidden)]
 pub struct Deviation {
     /// Largest difference of the field, in field units.
     pub field: f64,
@@ -76,6 +81,7 @@ pub struct Deviation {
 }
 
 /// Measures how far `mesh` is from `reference` in the part that is asked for.
+#[doc(hidden)]
 pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, part: &Part) -> Deviation {
     let measure = Measure { info, field: &info.fields[reference.field], mesh, reference, part };
     let wanted = |(p, _): &(&[f64; 3], &f64)| part.roi.is_none_or(|roi| roi.contains(**p));

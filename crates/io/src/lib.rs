@@ -82,16 +82,28 @@ mod xz;
 
 pub use contents::Survey;
 pub use error::{ReadError, ReadReason};
+#[doc(hidden)]
 pub use grid::MAX_GRID_POINTS;
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
+#[doc(hidden)]
 #[cfg(not(target_arch = "wasm32"))]
 pub use pieces::{PieceCounts, Pieces};
-pub use pvd::{Step, steps, write_pvd};
-pub use surface::{PointValues, PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
-pub use survey::{format_of, held_bytes, survey, survey_raw};
+#[doc(hidden)]
+pub use pvd::write_pvd;
+pub use pvd::{Step, steps};
+#[doc(hidden)]
+pub use surface::{PointValues, write_csv, write_obj};
+pub use surface::{PolyData, write_ply, write_stl, write_vtp};
+pub use survey::survey;
+#[doc(hidden)]
+pub use survey::{format_of, held_bytes, survey_raw};
+#[doc(hidden)]
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
-pub use write::{PointArray, point_arrays, write_vti, write_vtu};
+#[doc(hidden)]
+pub use write::{PointArray, point_arrays};
+pub use write::{write_vti, write_vtu};
+#[doc(hidden)]
 pub use write_layers::write_vti_layers;
 
 use std::path::Path;
@@ -146,6 +158,7 @@ fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadRea
 ///
 /// # Errors
 /// As [`read_with`].
+#[doc(hidden)]
 pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     read_unsettled(path, options).map(settled)
 }
@@ -247,6 +260,7 @@ fn read_other(name: &str, bytes: &[u8], _: &ReadOptions, _: Beside<'_>) -> Resul
 ///
 /// # Errors
 /// If the sidecar does not say what is needed, or the samples are not as many as it says.
+#[doc(hidden)]
 pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, ReadError> {
     let options = ReadOptions::default();
     let mesh =

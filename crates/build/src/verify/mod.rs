@@ -47,8 +47,12 @@ mod samples;
 mod shown;
 mod surfaces;
 
-pub use report::{MAX_FAILURES, VerifyReport};
+#[doc(hidden)]
+pub use report::MAX_FAILURES;
+pub use report::VerifyReport;
+#[doc(hidden)]
 pub use samples::{SampleRequest, run_request, samples};
+#[doc(hidden)]
 pub use shown::run_shown;
 
 use case::{Case, check_budget};
@@ -91,6 +95,7 @@ pub fn run<M: ApplyUpdates>(
 
 /// The extent of a partial verification, for very large meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[doc(hidden)]
 pub struct Sample {
     /// The most requests of each sort: those whose meshes are checked in full, and those of the history check.
     pub requests: usize,
@@ -117,6 +122,7 @@ impl Sample {
 
 /// [`run`] on a sample of the requests and of the reference vertices: for very large meshes. Checks that need no
 /// request, and the validity of the meshes, are complete.
+#[doc(hidden)]
 pub fn run_sample<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
@@ -133,6 +139,7 @@ pub fn run_sample<M: ApplyUpdates>(
 }
 
 /// [`run`] with requests of the caller's own.
+#[doc(hidden)]
 pub fn run_requests<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,

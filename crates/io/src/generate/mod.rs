@@ -10,7 +10,10 @@ mod hydrogen;
 mod marschner_lobb;
 mod sphere_flow;
 
-pub use error::{GenerateError, VOLUMES};
+pub use error::GenerateError;
+#[doc(hidden)]
+pub use error::VOLUMES;
+#[doc(hidden)]
 pub use hydrogen::Orbital;
 
 use tetralod::mesh::{LayeredGrid, TetMesh};
@@ -20,6 +23,7 @@ const GRID_SIZES: [u32; 2] = [2, 4096];
 
 /// What can be chosen of a volume beside its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[doc(hidden)]
 pub struct Options {
     /// Which orbital `hydrogen` is.
     pub orbital: Orbital,
@@ -75,6 +79,7 @@ pub fn volume(name: &str, size: u32, options: &Options) -> Result<Volume, Genera
 ///
 /// # Errors
 /// If nothing has this name, it cannot have this size, or has too many points.
+#[doc(hidden)]
 pub fn by_name(name: &str, size: u32) -> Result<TetMesh, GenerateError> {
     volume(name, size, &Options::default())?.into_mesh()
 }
@@ -86,6 +91,7 @@ pub fn by_name(name: &str, size: u32) -> Result<TetMesh, GenerateError> {
 ///
 /// # Errors
 /// If `size` is less than 2, or there are too many points.
+#[doc(hidden)]
 pub fn bucky(size: u32) -> Result<TetMesh, GenerateError> {
     by_name("bucky", size)
 }
@@ -99,6 +105,7 @@ pub fn bucky(size: u32) -> Result<TetMesh, GenerateError> {
 ///
 /// # Errors
 /// If `size` is less than 3, or there are too many points.
+#[doc(hidden)]
 pub fn sphere_flow(size: u32) -> Result<TetMesh, GenerateError> {
     check_size("sphere-flow", size, sphere_flow::SIZES)?;
     Ok(sphere_flow::mesh(size))

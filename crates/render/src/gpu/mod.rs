@@ -27,16 +27,23 @@ mod wire;
 
 /// The version of wgpu that the renderer takes devices of.
 pub use wgpu;
+#[doc(hidden)]
 pub use wgpu::TextureView;
 
+#[doc(hidden)]
 pub use context::Context;
 pub use error::GpuError;
 pub use renderer::Renderer;
+#[doc(hidden)]
 pub use side_target::SideTarget;
+#[doc(hidden)]
 pub use style::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Style};
-pub use types::{BoxLines, Look, MOST_CLIPS};
+pub use types::Look;
+#[doc(hidden)]
+pub use types::{BoxLines, MOST_CLIPS};
 
 /// Samples per pixel.
+#[doc(hidden)]
 pub const SAMPLES: u32 = 4;
 
 /// Runs a future of a native device to its end: such futures make progress when they are asked.
@@ -65,6 +72,7 @@ macro_rules! shader {
 }
 
 /// The shaders, each complete: name and WGSL source.
+#[doc(hidden)]
 pub const SHADERS: [(&str, &str); 8] = [
     ("background", shader!("background.wgsl")),
     ("surface", shader!("fragments.wgsl", "shading.wgsl", "surface.wgsl")),
