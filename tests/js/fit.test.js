@@ -12,7 +12,9 @@ const volume = {
   bounds: [0, 0, 0, 1, 1, 2],
 };
 
-const parts = (scene) => fitScene(scene, volume).dropped.map(({ part }) => part);
+/** Of scenes in plain JavaScript, whose lists have no lengths. */
+const fit = (/** @type {any} */ scene) => fitScene(scene, volume);
+const parts = (scene) => fit(scene).dropped.map(({ part }) => part);
 
 test("what fits stays as it is", () => {
   const scene = {
@@ -33,19 +35,19 @@ test("what fits stays as it is", () => {
     colours: { range: [-5, 0], map: "grey" },
     background: "light",
   };
-  assert.deepEqual(fitScene(scene, volume), { scene, dropped: [] });
+  assert.deepEqual(fit(scene), { scene, dropped: [] });
 });
 
 test("fields that the volume does not have go, with what needs them", () => {
   const flow = { fields: ["vx", "vy", "vz"], seeds: [[0, 0, 0]] };
-  const { scene, dropped } = fitScene({ slices: [{ normal: [0, 0, 1], offset: 1, field: "T" }], streamlines: flow, arrows: { fields: flow.fields } }, volume);
+  const { scene, dropped } = fit({ slices: [{ normal: [0, 0, 1], offset: 1, field: "T" }], streamlines: flow, arrows: { fields: flow.fields } });
   assert.deepEqual(scene, { slices: [{ normal: [0, 0, 1], offset: 1 }] });
   assert.deepEqual(
     dropped.map(({ part }) => part),
     ["slices[0].field", "streamlines", "arrows"],
   );
   assert.equal(dropped[1].problem, 'there is no field "vx"; this volume has: p, u');
-  const coloured = fitScene({ isosurfaces: [{ value: 0, field: "T" }], streamlines: { ...flow, fields: ["u", "u", "u"], field: "T" } }, volume);
+  const coloured = fit({ isosurfaces: [{ value: 0, field: "T" }], streamlines: { ...flow, fields: ["u", "u", "u"], field: "T" } });
   assert.deepEqual(coloured.scene.isosurfaces, [{ value: 0 }]);
   assert.equal(coloured.scene.streamlines.field, undefined);
 });
@@ -91,13 +93,13 @@ test("values, planes, boxes, points and lengths of another volume go", () => {
     [0, 0, 0],
     [0, 0, 9],
   ];
-  assert.deepEqual(fitScene({ streamlines: { fields: ["u", "u", "u"], seeds } }, volume).scene.streamlines.seeds, [[0, 0, 0]]);
+  assert.deepEqual(fit({ streamlines: { fields: ["u", "u", "u"], seeds } }).scene.streamlines.seeds, [[0, 0, 0]]);
 });
 
 test("where nothing is left, there is the isosurface in the middle", () => {
   const flow = { fields: ["vx", "vy", "vz"], seeds: [] };
-  assert.deepEqual(fitScene({ isosurfaces: [], streamlines: flow, outline: false }, volume).scene, { isosurfaces: [{}], outline: false });
-  assert.deepEqual(fitScene({ isosurfaces: [] }, volume).scene, { isosurfaces: [] }, "an empty picture that was wanted");
+  assert.deepEqual(fit({ isosurfaces: [], streamlines: flow, outline: false }).scene, { isosurfaces: [{}], outline: false });
+  assert.deepEqual(fit({ isosurfaces: [] }).scene, { isosurfaces: [] }, "an empty picture that was wanted");
 });
 
 test("changes that name a field which is not there are refused", () => {

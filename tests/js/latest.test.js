@@ -62,6 +62,9 @@ test("it is idle when nothing runs and nothing waits", async () => {
   assert.ok(idle);
 });
 
+/** Of updates in plain JavaScript, whose lists have no lengths. */
+const merged = (/** @type {any} */ a, /** @type {any} */ b) => mergeUpdates(a, b);
+
 test("movements that wait add up, changes of the scene stay apart; of everything else the later one counts", () => {
   const sets = [
     { id: 0, changes: { volume: {} } },
@@ -69,20 +72,20 @@ test("movements that wait add up, changes of the scene stay apart; of everything
   ];
   const a = { orbit: [1, 2], zoom: [2, 0, 0], sets: sets.slice(0, 1), size: [4, 5, 1] };
   const b = { orbit: [10, 20], pan: [5, 6], zoom: [0.25, 0.1, 0.2], sets: sets.slice(1) };
-  assert.deepEqual(mergeUpdates(a, b), {
+  assert.deepEqual(merged(a, b), {
     ...{ orbit: [11, 22], pan: [5, 6], zoom: [0.5, 0.1, 0.2] },
     ...{ sets, size: [4, 5, 1] },
   });
-  assert.deepEqual(mergeUpdates({ pan: [1, 1] }, { pan: [2, 3], size: [4, 5, 1] }), { pan: [3, 4], size: [4, 5, 1] });
+  assert.deepEqual(merged({ pan: [1, 1] }, { pan: [2, 3], size: [4, 5, 1] }), { pan: [3, 4], size: [4, 5, 1] });
 });
 
 test("going home forgets the movements before it and keeps those after it", () => {
   const sets = [{ id: 0, changes: {} }];
-  const home = mergeUpdates({ orbit: [1, 1], zoom: [3, 0, 0], sets }, { home: true });
+  const home = merged({ orbit: [1, 1], zoom: [3, 0, 0], sets }, { home: true });
   assert.deepEqual(home, { sets, home: true });
-  assert.deepEqual(mergeUpdates(home, { orbit: [2, 0] }), { sets, home: true, orbit: [2, 0] });
+  assert.deepEqual(merged(home, { orbit: [2, 0] }), { sets, home: true, orbit: [2, 0] });
   const camera = { target: [0, 0, 0], distance: 1, yaw: 0, pitch: 0, projection: "perspective" };
   const set = { id: 1, changes: {}, camera };
-  assert.deepEqual(mergeUpdates({ look: [1, 0], fly: [0, 0, 1] }, { sets: [set] }), { sets: [set] });
-  assert.deepEqual(mergeUpdates({ sets: [set] }, { home: true }), { sets: [{ id: 1, changes: {} }], home: true });
+  assert.deepEqual(merged({ look: [1, 0], fly: [0, 0, 1] }, { sets: [set] }), { sets: [set] });
+  assert.deepEqual(merged({ sets: [set] }, { home: true }), { sets: [{ id: 1, changes: {} }], home: true });
 });

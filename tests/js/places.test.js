@@ -52,7 +52,7 @@ async function works(how) {
 
 test("the version of the workers is that of the package", async () => {
   const { version } = JSON.parse(await readFile(at("package.json"), "utf8"));
-  assert.equal(VERSION, version, "pkg-template/version.js");
+  assert.equal(VERSION, version, "pkg-template/version.ts");
 });
 
 test("worker and wasm are taken from other places, or from a worker that is passed in", async () => {

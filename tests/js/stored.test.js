@@ -1,14 +1,16 @@
 // Arrays of single precision that are relative to an origin, and what libraries of graphics get of them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { applyChanges, emptyMesh } from "../../pkg-template/changes.js";
-import { absolute, fieldsOf, withFields } from "../../pkg-template/stored.js";
+import { applyChanges, emptyMesh } from "../../pkg/changes.js";
+import { absolute, fieldsOf, withFields } from "../../pkg/stored.js";
 
 // By their addresses: the declarations beside them name types of libraries that are not here.
-const adapter = (name) => import(new URL(`../../pkg-template/${name}.js`, import.meta.url).href);
+const adapter = (name) => import(new URL(`../../pkg/${name}.js`, import.meta.url).href);
 const [{ createSurface: createThreeSurface }, { createSurface: createVtkSurface }] = await Promise.all(["three", "vtk"].map(adapter));
 
+/** @type {import("../../pkg/index.js").Stored} */
 const FAR = { origin: [600_000, 5_800_000.25, 0], offset: 1.7e9, scale: 2 };
+/** @type {import("../../pkg/index.js").Stored} */
 const NEAR = { origin: [0, 0, 0], offset: 0, scale: 1 };
 const triangle = {
   positions: Float32Array.of(0.1, 0.2, 0.3, 1, 0, 0, 0, 1, 0),
@@ -27,7 +29,7 @@ test("absolute numbers are copies in double precision only where they must be", 
   assert.ok(far.positions instanceof Float64Array && far.values instanceof Float64Array);
   assert.deepEqual([...far.positions], places);
   assert.deepEqual([...far.values], values);
-  assert.equal(absolute({ positions: triangle.positions, ...NEAR }).values, undefined);
+  assert.equal("values" in absolute({ positions: triangle.positions, ...NEAR }), false);
   assert.deepEqual([far.origin, far.offset, far.scale], [NEAR.origin, NEAR.offset, NEAR.scale]);
   assert.equal(far.indices, triangle.indices);
   const { field } = absolute({ positions: triangle.positions, field: triangle.values, ...FAR });

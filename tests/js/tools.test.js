@@ -15,8 +15,8 @@ const tets = [
   [0, 4, 5, 7],
   [0, 5, 1, 7],
 ];
-const linear = ([x, y, z]) => x - ORIGIN[0] + 2 * y + 3 * z;
-const time = ([x, y, z]) => 1.7e9 + 5 * (x - ORIGIN[0]) - y + 2 * z;
+const linear = (/** @type {ArrayLike<number>} */ { 0: x, 1: y, 2: z }) => x - ORIGIN[0] + 2 * y + 3 * z;
+const time = (/** @type {ArrayLike<number>} */ { 0: x, 1: y, 2: z }) => 1.7e9 + 5 * (x - ORIGIN[0]) - y + 2 * z;
 
 /** The mesh as VTK's XML has it. */
 function vtu() {

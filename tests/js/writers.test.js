@@ -1,7 +1,7 @@
 // The files that the demo page saves, read back.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { absolute } from "../../pkg-template/stored.js";
+import { absolute } from "../../pkg/stored.js";
 import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "../../www/writers.js";
 
 /** @type {Omit<import("../../www/writers.js").Field, "index" | "values">} */
@@ -229,6 +229,7 @@ test("CSV: words with commas are in quotes, missing numbers are empty", async ()
 });
 
 test("what is relative to an origin is saved in absolute numbers of double precision, or the origin with it", async () => {
+  /** @type {import("../../pkg/index.js").Stored} */
   const stored = { origin: [600_000, 5_800_000.25, 0], offset: 1.7e9, scale: 1 };
   const far = absolute({ ...mesh, ...stored, fields: mesh.fields.map((field) => ({ ...field, name: "t", offset: stored.offset })) });
   const places = [...mesh.positions].map((x, i) => stored.origin[i % 3] + x);

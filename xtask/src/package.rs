@@ -1,5 +1,5 @@
-//! `cargo xtask build`: the three wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
-//! `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
+//! `cargo xtask build`: the three wasm modules, and the scripts and declarations that TypeScript makes of `pkg-template/`, merged into
+//! `pkg/`, with `inline.js`, which `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
 //!
 //! The core (decoder, refinement, and the tools for meshes), the viewer (the same with the renderer) and the builder are separate
 //! modules, so that a page which draws by its own means does not download a renderer, and one that shows files no builder.
@@ -72,6 +72,9 @@ impl Profile {
     }
 }
 
+/// Where it is put together before that. `pkg-template/tsconfig.json` finds the types of the modules there.
+const STAGING: &str = "target/pkg-staging";
+
 /// Names the profile of `pkg/`. It is not in there, since all that is there is published.
 const MADE: &str = "target/pkg-profile";
 
@@ -103,7 +106,7 @@ pub fn build_for_tests() -> Result<()> {
 
 fn build_all(profile: Profile) -> Result<()> {
     prepare()?;
-    let staging = Path::new("target/pkg-staging");
+    let staging = Path::new(STAGING);
     remake(staging)?;
     compile_all(MODULES.iter(), profile, staging)?;
     assemble(staging)?;
@@ -115,13 +118,15 @@ pub fn build_viewer() -> Result<()> {
     build_some(&[&VIEWER])
 }
 
-/// Puts some modules into `pkg/`, and all scripts but `inline.js`.
+/// Puts some modules into `pkg/`, and all scripts but `inline.js`. The scripts are not checked: types of other modules may be missing.
 fn build_some(modules: &[&Module]) -> Result<()> {
     prepare()?;
     let staging = Path::new("target/pkg-part");
     remake(staging)?;
     compile_all(modules.iter().copied(), Profile::Released, staging)?;
-    copy_scripts(staging)?;
+    compile_scripts(staging, &["--noCheck"])?;
+    // That one is made of all the modules.
+    fs::remove_file(staging.join("inline.js")).context("inline.js")?;
     move_files(staging, Path::new(PKG))
 }
 
@@ -216,7 +221,7 @@ fn optimise(wasm: &Path) -> Result<()> {
 
 /// The package is put together beside `pkg/` and moved there, so that a failed build leaves the last good one.
 fn assemble(staging: &Path) -> Result<()> {
-    copy_scripts(staging)?;
+    compile_scripts(staging, &[])?;
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(licence, staging.join(licence)).context(licence)?;
     }
@@ -231,12 +236,18 @@ fn assemble(staging: &Path) -> Result<()> {
     Ok(())
 }
 
-fn copy_scripts(folder: &Path) -> Result<()> {
+/// Puts the scripts, their declarations, and what goes with them into `folder`.
+fn compile_scripts(folder: &Path, options: &[&str]) -> Result<()> {
     let template = Path::new("pkg-template");
-    for file in files_of(template)? {
-        fs::copy(template.join(&file), folder.join(&file)).with_context(|| format!("copying {file}"))?;
+    for file in ["README.md", "package.json"] {
+        fs::copy(template.join(file), folder.join(file)).with_context(|| format!("copying {file}"))?;
     }
-    Ok(())
+    // Not beside the types of the modules, which would be compiled together with what was made of them the last time.
+    let made = Path::new("target/pkg-scripts");
+    remake(made)?;
+    let mut compiler = shell::command("node", ["tests/js/node_modules/typescript/bin/tsc", "--project"]);
+    shell::run(compiler.arg(template).arg("--outDir").arg(made).args(options))?;
+    move_files(made, folder)
 }
 
 /// One by one: a server may be reading the files that these replace.

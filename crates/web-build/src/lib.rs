@@ -11,22 +11,21 @@ use serde::Serialize;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use tetralod::Coded;
-use tetralod::format::{EncodeError, EncodeOptions, encode};
+use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Bounds;
 use tetralod::mesh::{
     self, Field, GeometryField, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh,
 };
 use tetralod_build::{self as builder, BuildConfig, BuildError, BuildProgress, BuildSummary, Remedy};
 use tetralod_io::{
-    self as io, CellData, FieldSelection, MemoryLimit, ReadError, ReadOptions, ReadReason, Survey,
-    TimeStepsError, read_time_steps,
+    self as io, CellData, FieldSelection, MemoryLimit, ReadError, ReadOptions, Survey, read_time_steps,
 };
 use tetralod_web::error::WebError;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 
 #[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = include_str!("build.d.ts");
+const TYPES: &str = r#"import type { CoreBuildOptions, CoreBuildReport, InputInfo } from "./build.js";"#;
 
 #[wasm_bindgen]
 extern "C" {

@@ -11,7 +11,7 @@ mod overlay;
 mod screenshot;
 
 use glam::DVec2;
-use js_sys::{Array, Float64Array};
+use js_sys::Uint8Array;
 use serde::Serialize;
 use tetralod::geom::{Bounds, Camera, CameraState, ViewPreset};
 use tetralod::refine::{Part, View};
@@ -20,6 +20,7 @@ use tetralod::view::BoxEdge;
 use tetralod::view::gizmo::{self, BoxFace};
 use tetralod_render::gpu::{Renderer, SideTarget};
 use tetralod_render::scene::{Legend, Scene, SceneState};
+use tetralod_web::arrays::{doubles, list, object, objects, set};
 use tetralod_web::error::WebError;
 use tetralod_web::file::File;
 use tetralod_web::loader::RangeLoader;
@@ -36,8 +37,9 @@ const REACH: f64 = 18.0;
 /// Pictures of which the one at rest is the mean.
 const SAMPLES: u32 = 8;
 
-/// Ticks of the legend, at most.
+/// Ticks of the legend, at most, and its colours.
 const TICKS: usize = 7;
+const COLOURS: usize = 32;
 
 /// An MT and its picture on a canvas.
 #[wasm_bindgen]
@@ -62,14 +64,27 @@ pub struct Viewer {
     pub(crate) screenshot: Option<SideTarget>,
 }
 
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = r#"import type { BlockMap } from "./results.js";
+import type { CameraState, Legend, Overlay, Reading, SceneState } from "./scene.js";"#;
+
 #[wasm_bindgen]
 extern "C" {
     /// What is drawn, as JavaScript gives it: anything at all.
-    #[wasm_bindgen(typescript_type = "object")]
+    #[wasm_bindgen(typescript_type = "SceneState")]
     pub type JsScene;
     /// Where the camera is.
-    #[wasm_bindgen(typescript_type = "object")]
+    #[wasm_bindgen(typescript_type = "CameraState")]
     pub type JsCamera;
+    /// What the colours mean.
+    #[wasm_bindgen(typescript_type = "Legend")]
+    pub type JsLegend;
+    /// What is at a point.
+    #[wasm_bindgen(typescript_type = "Reading")]
+    pub type JsReading;
+    /// Where the blocks of a file are.
+    #[wasm_bindgen(typescript_type = "BlockMap")]
+    pub type JsBlockMap;
 }
 
 /// Plain data for JavaScript.
@@ -202,12 +217,15 @@ impl Viewer {
         self.coming().blocks()
     }
 
-    /// Where the blocks are: of each the lower and the upper corner of its box, in units of the model, and whether it is not here (0),
-    /// here (1), or used by the mesh (2). Empty where the file has no index.
+    /// Where the blocks are, and which of them are here; nothing where the file has no index.
     #[wasm_bindgen(js_name = blockMap)]
-    pub fn block_map(&self) -> Box<[f64]> {
-        let of = |block: MappedBlock| flat(&block.bounds).into_iter().chain([f64::from(block.state as u8)]);
-        self.file.session().block_map().into_iter().flat_map(of).collect()
+    pub fn block_map(&self) -> Option<JsBlockMap> {
+        let blocks = self.file.session().block_map();
+        let bounds: Vec<f64> = blocks.iter().flat_map(|block| flat(&block.bounds)).collect();
+        let states: Vec<u8> = blocks.iter().map(|block: &MappedBlock| block.state as u8).collect();
+        let map =
+            || object(&[("bounds", doubles(&bounds)), ("states", Uint8Array::from(&states[..]).into())]);
+        (!blocks.is_empty()).then(map)
     }
 
     /// The file has ended: refuses one that was cut short.
@@ -313,35 +331,36 @@ impl Viewer {
         Ok(())
     }
 
-    /// What the colours mean, as a list of numbers and a list of labels, as [`Viewer::overlay`] does; both are empty where nothing is
-    /// coloured by values.
-    ///
-    /// The numbers are: the range, whether the scale is logarithmic, red, green and blue of 32 colours (to 255), and for each tick
-    /// where it is in the range (of 1) and its value. The labels are that of the scale and those of the ticks.
-    pub fn legend(&self) -> Array {
-        let (mut numbers, labels) = (Vec::new(), Array::new());
-        if let Some(Legend { label, scale }) = self.scene.legend() {
-            labels.push(&label.as_str().into());
-            numbers.extend_from_slice(&[scale.range[0], scale.range[1], f64::from(u8::from(scale.is_log))]);
-            for [red, green, blue, _] in scale.table::<32>() {
-                numbers.extend_from_slice(&[red, green, blue].map(f64::from));
-            }
-            for tick in scale.ticks(TICKS) {
-                numbers.extend_from_slice(&[scale.fraction(tick.value), tick.value]);
-                labels.push(&tick.label.into());
-            }
-        }
-        numbers_and_labels(&numbers, labels)
+    /// What the colours mean; nothing where nothing is coloured by values.
+    pub fn legend(&self) -> Option<JsLegend> {
+        let Legend { label, scale } = self.scene.legend()?;
+        let colours = scale.table::<COLOURS>();
+        let colours =
+            colours.iter().map(|[red, green, blue, _]| format!("#{red:02x}{green:02x}{blue:02x}").into());
+        let ticks = scale.ticks(TICKS).into_iter().map(|tick| {
+            let fraction = scale.fraction(tick.value);
+            object(&[
+                ("value", tick.value.into()),
+                ("label", tick.label.into()),
+                ("fraction", fraction.into()),
+            ])
+        });
+        Some(object(&[
+            ("label", label.as_str().into()),
+            ("range", list(&scale.range)),
+            ("log", scale.is_log.into()),
+            ("colours", objects(colours)),
+            ("ticks", objects(ticks)),
+        ]))
     }
 
-    /// What is known of the current mesh at a point, in model units: as [`Viewer::pick`]; nothing outside of the mesh.
-    pub fn reading(&mut self, x: f64, y: f64, z: f64) -> Result<Option<Box<[f64]>>, WebError> {
+    /// What is at a point of the model, in the current mesh; nothing outside of it.
+    pub fn reading(&mut self, x: f64, y: f64, z: f64) -> Result<Option<JsReading>, WebError> {
         self.reading_at([x, y, z])
     }
 
-    /// What is shown at a screen point: its place, the number of its tetrahedron, the size and the error of that, the number of
-    /// the field that is shown, and the value of each field; nothing if nothing is there.
-    pub fn pick(&mut self, x: f64, y: f64) -> Result<Option<Box<[f64]>>, WebError> {
+    /// What is shown at a screen point; nothing if nothing is there.
+    pub fn pick(&mut self, x: f64, y: f64) -> Result<Option<JsReading>, WebError> {
         let ray = self.camera.ray(DVec2::new(x, y), self.aspect());
         match self.scene.pick(self.file.session_mut(), &ray) {
             Some(point) => self.reading_at(point),
@@ -349,15 +368,24 @@ impl Viewer {
         }
     }
 
-    /// What is known of the mesh at a point of the model; nothing outside of it.
-    fn reading_at(&mut self, point: [f64; 3]) -> Result<Option<Box<[f64]>>, WebError> {
+    fn reading_at(&mut self, point: [f64; 3]) -> Result<Option<JsReading>, WebError> {
         let session = self.file.session_mut();
         let Some(reading) = session.reading(point)? else { return Ok(None) };
-        let [x, y, z] = reading.position;
-        let shown = session.field() as f64;
-        let mut known = vec![x, y, z, f64::from(reading.tet), reading.size, reading.error, shown];
-        known.extend_from_slice(&reading.values);
-        Ok(Some(known.into()))
+        let fields = &session.info().ok_or_else(WebError::not_ready)?.fields;
+        let now = fields[session.field()].time;
+        let by_name: JsValue = object(&[]);
+        // Of the time steps of a field that which is shown counts, or the first.
+        let all = || fields.iter().zip(&reading.values).rev();
+        for (field, value) in all().chain(all().filter(|(field, _)| field.time == now)) {
+            set(&by_name, &field.name, &(*value).into());
+        }
+        Ok(Some(object(&[
+            ("position", list(&reading.position)),
+            ("values", by_name),
+            ("tet", reading.tet.into()),
+            ("size", reading.size.into()),
+            ("error", reading.error.into()),
+        ])))
     }
 
     /// The box that has handles.
@@ -564,11 +592,6 @@ const SIDES: [(&str, ViewPreset); 7] = [
     ("alongZ", ViewPreset::AlongZ),
     ("againstZ", ViewPreset::AgainstZ),
 ];
-
-/// A list of numbers and one of labels: objects of types of their own would make the module larger.
-pub(crate) fn numbers_and_labels(numbers: &[f64], labels: Array) -> Array {
-    [JsValue::from(Float64Array::from(numbers)), labels.into()].into_iter().collect()
-}
 
 fn flat(bounds: &Bounds) -> Box<[f64]> {
     bounds.min.into_iter().chain(bounds.max).collect()

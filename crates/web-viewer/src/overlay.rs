@@ -1,56 +1,62 @@
 //! What an overlay over the picture draws: axes of the box with their ticks, a scale bar, the rotation of the camera.
 //!
-//! Points are in normalised coordinates of the canvas, as in [`Camera`](tetralod::geom::Camera). The worker makes objects of the
-//! numbers; types for each of them would make the module larger.
+//! Points are in normalised coordinates of the canvas, as in [`Camera`](tetralod::geom::Camera).
 
-use crate::{Viewer, numbers_and_labels};
-use js_sys::Array;
+use crate::Viewer;
 use tetralod::geom::Projection;
 use tetralod::view::{BoxAxis, ScaleBar, box_axis, scale_bar, tick_edges};
+use tetralod_web::arrays::{list, object, objects};
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// The smallest mean distance between ticks, in units of the page's layout: labels are about as wide.
 const TICK_SPACING: f64 = 56.0;
 
 #[wasm_bindgen]
+extern "C" {
+    /// What an overlay draws.
+    #[wasm_bindgen(typescript_type = "Overlay")]
+    pub type JsOverlay;
+}
+
+#[wasm_bindgen]
 impl Viewer {
-    /// What an overlay over the last picture draws, as a list of numbers and a list of labels; both are empty until the base mesh is
-    /// there.
-    ///
-    /// The numbers are: length and width (of 1) of the scale bar, and whether it holds everywhere; right, up and towards the eye as
-    /// directions in the model; the matrix from the model to the canvas, column by column; and for each axis its number, its two
-    /// ends, the direction of its labels, how many ticks it has, and their points. The labels are those of the bar and of the ticks.
-    pub fn overlay(&mut self) -> Array {
-        let (mut numbers, labels) = (Vec::new(), Array::new());
-        if let Some(bounds) = self.scene.bounds().copied() {
-            let (camera, aspect) = (self.camera, self.aspect());
-            let ScaleBar { length, label, width } = scale_bar(&camera, aspect);
-            let everywhere = camera.projection() == Projection::Orthographic;
-            labels.push(&label.into());
-            numbers.extend_from_slice(&[length, width, f64::from(u8::from(everywhere))]);
-            for direction in [camera.right(), camera.up(), -camera.forward()] {
-                numbers.extend_from_slice(&direction.to_array());
-            }
-            numbers.extend_from_slice(&self.view().matrix);
-            let spacing = 2.0 * TICK_SPACING * self.ratio / f64::from(self.scene.renderer().size()[1]);
-            self.tick_edges = tick_edges(&bounds, &camera, aspect, self.tick_edges);
-            let edges = self.tick_edges.into_iter().flatten();
-            for axis in edges.filter_map(|edge| box_axis(edge, &bounds, &camera, aspect, spacing)) {
-                put(axis, &mut numbers, &labels);
-            }
-        }
-        numbers_and_labels(&numbers, labels)
+    /// What an overlay over the last picture draws; nothing until the base mesh is there.
+    pub fn overlay(&mut self) -> Option<JsOverlay> {
+        let bounds = *self.scene.bounds()?;
+        let (camera, aspect) = (self.camera, self.aspect());
+        let directions = [camera.right(), camera.up(), -camera.forward()];
+        let spacing = 2.0 * TICK_SPACING * self.ratio / f64::from(self.scene.renderer().size()[1]);
+        self.tick_edges = tick_edges(&bounds, &camera, aspect, self.tick_edges);
+        let edges = self.tick_edges.into_iter().flatten();
+        let axes = edges.filter_map(|edge| box_axis(edge, &bounds, &camera, aspect, spacing));
+        let everywhere = camera.projection() == Projection::Orthographic;
+        Some(object(&[
+            ("axes", objects(axes.map(axis))),
+            ("scaleBar", bar(scale_bar(&camera, aspect), everywhere)),
+            ("rotation", objects(directions.iter().map(|direction| list(&direction.to_array())))),
+            ("matrix", list(&self.view().matrix)),
+        ]))
     }
 }
 
-fn put(BoxAxis { edge, ends: [from, to], outward, ticks }: BoxAxis, numbers: &mut Vec<f64>, labels: &Array) {
-    numbers.push(edge.axis as f64);
-    for point in [from, to, outward] {
-        numbers.extend_from_slice(&point.to_array());
-    }
-    numbers.push(ticks.len() as f64);
-    for tick in ticks {
-        numbers.extend_from_slice(&tick.screen.to_array());
-        labels.push(&tick.tick.label.into());
-    }
+fn bar(ScaleBar { length, label, width }: ScaleBar, everywhere: bool) -> JsValue {
+    object(&[
+        ("label", label.into()),
+        ("length", length.into()),
+        ("width", width.into()),
+        ("everywhere", everywhere.into()),
+    ])
+}
+
+fn axis(BoxAxis { edge, ends, outward, ticks }: BoxAxis) -> JsValue {
+    let ticks = ticks
+        .into_iter()
+        .map(|tick| object(&[("label", tick.tick.label.into()), ("at", list(&tick.screen.to_array()))]));
+    object(&[
+        ("axis", (edge.axis as f64).into()),
+        ("ends", objects(ends.iter().map(|end| list(&end.to_array())))),
+        ("outward", list(&outward.to_array())),
+        ("ticks", objects(ticks)),
+    ])
 }

@@ -1,11 +1,7 @@
 //! Plain objects and typed arrays for JavaScript.
 
 use js_sys::{Array, Float32Array, Float64Array, Object, Reflect, Uint32Array};
-use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
-
-#[wasm_bindgen(typescript_custom_section)]
-const TOOLS: &str = include_str!("tools.d.ts");
 
 /// Setting a property on a fresh ordinary object cannot fail.
 #[inline(never)]
@@ -47,6 +43,11 @@ pub fn record<T: JsCast>(names: &[&str], numbers: &[f64]) -> T {
         set(&object, name, &(*number).into());
     }
     object.unchecked_into()
+}
+
+/// A plain list of objects or of arrays.
+pub fn objects(all: impl Iterator<Item = JsValue>) -> JsValue {
+    all.collect::<Array>().into()
 }
 
 /// A plain list of numbers.

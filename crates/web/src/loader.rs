@@ -13,8 +13,10 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen]
 extern "C" {
     /// `{ id, start, end }`, `{ start, end }`, `{ id }` or `{ until }`: fetch, read from the cache, cancel, wait.
+    #[wasm_bindgen(typescript_type = "{ id?: number, start?: number, end?: number, until?: number }")]
     pub type JsAction;
     /// `{ start, end, bytes }`.
+    #[wasm_bindgen(typescript_type = "{ start: number, end: number, bytes: Uint8Array<ArrayBuffer> }")]
     pub type JsRange;
 }
 

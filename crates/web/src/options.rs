@@ -13,7 +13,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 
 #[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = include_str!("options.d.ts");
+const TYPES: &str = r#"import type { RefineOptions } from "./options.js";"#;
 
 #[wasm_bindgen]
 extern "C" {

@@ -1,9 +1,8 @@
 //! What JavaScript gets of a session: plain objects, and typed arrays that own their memory.
 
-use crate::arrays::{doubles, integers, list, object, record, set};
+use crate::arrays::{doubles, integers, list, object, objects, record, set};
 use crate::options::Asked;
 use crate::stored::Stored;
-use js_sys::Array;
 use tetralod::geom::Bounds;
 use tetralod::mt::{FieldInfo, MtInfo};
 use tetralod::refine::RefineStats;
@@ -13,7 +12,7 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = include_str!("results.d.ts");
+const TYPES: &str = r#"import type { BlockProgress, CoreStats, Mesh, MeshChanges, MeshDelta, MtInfo, Progress } from "./results.js";"#;
 
 #[wasm_bindgen]
 extern "C" {
@@ -61,10 +60,10 @@ pub fn blocks(progress: &BlockProgress) -> JsBlocks {
 pub fn info(session: &Session) -> Option<JsInfo> {
     let info = session.info()?;
     let Bounds { min: [x0, y0, z0], max: [x1, y1, z1] } = session.bounds()?;
-    let fields: Array = (0..info.fields.len()).map(|index| field(session, info, index)).collect();
+    let fields = (0..info.fields.len()).map(|index| field(session, info, index));
     Some(object(&[
         ("kind", info.kind.name().into()),
-        ("fields", fields.into()),
+        ("fields", objects(fields)),
         ("bounds", list(&[x0, y0, z0, x1, y1, z1])),
         ("origin", list(&info.single_points().origin)),
         ("vertices", info.vertices.into()),

@@ -1,6 +1,6 @@
 //! What can be got out of a mesh besides itself: surfaces, sections, values along lines, sums.
 
-use crate::arrays::{doubles, floats, integers, object, set};
+use crate::arrays::{doubles, floats, integers, object, objects, set};
 use crate::error::WebError;
 use crate::stored::Stored;
 use js_sys::{Array, Object};
@@ -10,6 +10,10 @@ use tetralod::view::{
 };
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
+
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str =
+    r#"import type { FieldStats, IsoSurface, LineProfile, Slice, Streamline, Surface } from "./results.js";"#;
 
 #[wasm_bindgen]
 extern "C" {
@@ -72,8 +76,7 @@ pub fn boundary(mesh: &MeshView<'_>, fields: impl Iterator<Item = Vec<f64>>, sto
 
 /// Puts the values of other fields at the vertices of a surface beside it, in double precision: the package stores them as each needs it.
 pub fn put_fields(surface: &JsValue, fields: impl Iterator<Item = Vec<f64>>) {
-    let arrays: Array = fields.map(|values| doubles(&values)).collect();
-    set(surface, "fields", &arrays);
+    set(surface, "fields", &objects(fields.map(|values| doubles(&values))));
 }
 
 /// The field at some points, three coordinates each; NaN outside of the mesh.

@@ -1,0 +1,125 @@
+/** What of a scene fits a volume: scenes outlive the volumes that they were made for. */
+
+import { badOption } from "./errors.js";
+import type { FieldInfo } from "./results.js";
+import type { ArrowState, ViewerChanges, Misfit, PlaneState, SceneState, StreamlineState } from "./scene.js";
+
+/** Lengths that are drawn with are between these parts of the box's diagonal. */
+const LEAST = 1e-5;
+const MOST = 1e3;
+
+/** What is shown where nothing that fits is left. */
+const FIRST: SceneState = { isosurfaces: [{}] };
+const PARTS = ["volume", "boundary", "cells", "streamlines", "arrows"] as const;
+const LISTS = ["isosurfaces", "slices"] as const;
+const FLOWS = ["streamlines", "arrows"] as const;
+
+/** What is asked of a field. */
+type Field = Pick<FieldInfo, "name" | "min" | "max">;
+
+/** What is asked of a volume. */
+export interface Volume {
+  fields: Field[];
+  bounds: number[];
+}
+
+/** `scene` with some parts replaced; `null` gives a part its default. */
+export function changedScene<S extends SceneState>(scene: S, changes: ViewerChanges | Record<string, unknown>): S {
+  const all = Object.entries({ ...scene, ...changes });
+  return Object.fromEntries(all.filter(([, value]) => value !== null && value !== undefined)) as S;
+}
+
+const isKnown = (name: string, fields: Field[]) => fields.some((field) => field.name === name);
+
+function unknown(name: string, fields: Field[]): string {
+  const names = [...new Set(fields.map((field) => field.name))].join(", ");
+  return `there is no field ${JSON.stringify(name)}; this volume has: ${names}`;
+}
+
+/** Refuses a scene that names a field which the volume does not have. */
+export function checkFields(scene: SceneState, { fields }: Volume) {
+  const named: [string, string | undefined][] = LISTS.flatMap((list) =>
+    [...(scene[list] ?? [])].map(({ field }, i): [string, string | undefined] => [`${list}[${i}].field`, field]),
+  );
+  for (const part of FLOWS) {
+    const flow = scene[part];
+    if (!flow) continue;
+    named.push(...(flow.fields ?? []).map((name): [string, string] => [`${part}.fields`, name]), [`${part}.field`, flow.field]);
+  }
+  for (const [place, name] of named) {
+    if (typeof name === "string" && !isKnown(name, fields)) throw badOption(place, unknown(name, fields));
+  }
+}
+
+/** Says what does not fit of a value; nothing where it does. */
+type Judge = (value: any) => string | undefined;
+
+/**
+ * What of a scene fits a volume: fields that it has, values that one of its fields has, planes, boxes and points that meet its box,
+ * lengths of its order. Where nothing is left that shows anything, it is the isosurface in the middle. The scene is one that wasm has
+ * taken.
+ */
+export function fitScene(scene: SceneState, { fields, bounds }: Volume): { scene: SceneState; dropped: Misfit[] } {
+  const dropped: Misfit[] = [];
+  /** Whether it fits: without a problem; else that is told. */
+  const keep = (part: string, problem: string | undefined) => {
+    if (problem !== undefined) dropped.push({ part, problem });
+    return problem === undefined;
+  };
+  /** `state` without the members that do not fit. */
+  const only = <S extends object>(state: S, part: string, judge: Record<string, Judge>): S => {
+    const fits = ([name, value]: [string, unknown]) => {
+      const problem = value === undefined || value === null ? undefined : judge[name]?.(value);
+      return keep(part ? `${part}.${name}` : name, problem);
+    };
+    return Object.fromEntries(Object.entries(state).filter(fits)) as S;
+  };
+  const field = (name: string) => (isKnown(name, fields) ? undefined : unknown(name, fields));
+  const hasValue = (low: number, high: number) => fields.some(({ min, max }) => high >= min && low <= max);
+  const value = (number: number) => (hasValue(number, number) ? undefined : `no field has the value ${number}`);
+  const range = ([low, high]: [number, number]) => (hasValue(low, high) ? undefined : `no field has a value from ${low} to ${high}`);
+  const values = (points: number[][]) => {
+    const all = points.map(([number]) => number);
+    return all.length === 0 ? undefined : range([Math.min(...all), Math.max(...all)]);
+  };
+  const diagonal = Math.hypot(...[0, 1, 2].map((i) => bounds[i + 3] - bounds[i]));
+  const length = (number: number) =>
+    number >= LEAST * diagonal && number <= MOST * diagonal ? undefined : `${number} is not of the order of the volume, whose diagonal is ${diagonal}`;
+  /** Where the box is along a normal. */
+  const along = (normal: number[]) => {
+    const ends = normal.map((x, i) => [x * bounds[i], x * bounds[i + 3]]);
+    return [ends.reduce((sum, pair) => sum + Math.min(...pair), 0), ends.reduce((sum, pair) => sum + Math.max(...pair), 0)];
+  };
+  const [outside, all] = ["it does not meet the volume", "it cuts all of the volume away"];
+  const meets = ({ normal, offset }: PlaneState) => (offset >= along(normal)[0] && offset <= along(normal)[1] ? undefined : outside);
+  const leaves = ({ normal, offset }: PlaneState) => (offset >= along(normal)[0] ? undefined : all);
+  const overlaps = (box: ArrayLike<number>) => ([0, 1, 2].every((i) => box[i] <= bounds[i + 3] && box[i + 3] >= bounds[i]) ? undefined : outside);
+  const isInside = (point: number[]) => point.every((x, i) => x >= bounds[i] && x <= bounds[i + 3]);
+
+  const fitted = only(scene, "", { clipBox: overlaps, region: overlaps });
+  fitted.isosurfaces &&= fitted.isosurfaces.map((one, i) => only(one, `isosurfaces[${i}]`, { field, value }));
+  fitted.slices &&= fitted.slices.map((one, i) => only(one, `slices[${i}]`, { field }));
+  fitted.slices &&= fitted.slices.filter((slice, i) => keep(`slices[${i}]`, meets(slice)));
+  fitted.clips &&= fitted.clips.filter((clip, i) => keep(`clips[${i}]`, leaves(clip)));
+  fitted.volume &&= only(fitted.volume, "volume", { opacities: values, points: values, unitLength: length });
+  fitted.cells &&= only(fitted.cells, "cells", { cut: leaves });
+  fitted.colours &&= only(fitted.colours, "colours", { range });
+  /** Tubes or arrows, if the volume has their field. */
+  const flow = <F extends StreamlineState | ArrowState>(state: F, part: string): F | undefined => {
+    const missing = (state.fields ?? []).find((name) => !isKnown(name, fields));
+    const fits = keep(part, missing === undefined ? undefined : unknown(missing, fields));
+    return fits ? only(state, part, { field, radius: length, spacing: length }) : undefined;
+  };
+  fitted.streamlines &&= flow(fitted.streamlines, "streamlines");
+  fitted.arrows &&= flow(fitted.arrows, "arrows");
+  const { seeds = [] } = fitted.streamlines ?? {};
+  if (fitted.streamlines && seeds.length > 0) {
+    const inside = seeds.filter(isInside);
+    const out = seeds.length - inside.length;
+    keep("streamlines.seeds", out === 0 ? undefined : `${out} of ${seeds.length} points are outside of the volume`);
+    fitted.streamlines = inside.length === 0 ? undefined : { ...fitted.streamlines, seeds: inside };
+  }
+  for (const part of FLOWS) if (fitted[part] === undefined) delete fitted[part];
+  const isEmpty = PARTS.every((part) => !fitted[part]) && LISTS.every((list) => !fitted[list]?.length);
+  return { scene: isEmpty && dropped.length > 0 ? { ...fitted, ...FIRST } : fitted, dropped };
+}

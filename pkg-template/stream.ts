@@ -1,0 +1,278 @@
+/**
+ * Everything that an MT can be read from, as one stream of chunks: with abort, with errors that name the source, and
+ * with backpressure (the next chunk is read when the last one has been taken).
+ *
+ * A chunk that comes out of here owns its buffer, so it may be moved into a worker.
+ */
+
+import { TetralodError, known, ofFile } from "./errors.js";
+
+/** Everything that an MT can be read from. Bytes in memory are copied, not taken away. */
+export type Source =
+  | string
+  | URL
+  | Request
+  | Response
+  | Blob
+  | ArrayBuffer
+  | ArrayBufferView
+  | ReadableStream<Uint8Array>
+  | AsyncIterable<Uint8Array>;
+
+/** Bytes in memory are handed on in pieces of this size, so that progress shows and abort works. */
+const PIECE = 1 << 20;
+
+/** Bytes that own their buffer. */
+type Bytes = Uint8Array<ArrayBuffer>;
+
+/** Chunks of a source, checked. */
+interface Chunks {
+  next(): Promise<IteratorResult<Bytes, undefined>>;
+  return?(value?: undefined): unknown;
+}
+
+/** A source that is open. */
+export interface OpenSource {
+  /** What to call the source in messages. */
+  name: string;
+  /** Its size in bytes where that is known. */
+  total: number | undefined;
+  chunks: Chunks;
+}
+
+/** What goes along with a request. */
+export interface Along {
+  headers?: HeadersInit;
+  credentials?: RequestCredentials;
+}
+
+/** Opens `source`; for a URL this waits for the response's status. */
+export async function openSource(source: Source, signal?: AbortSignal, { headers, credentials }: Along = {}): Promise<OpenSource> {
+  signal?.throwIfAborted();
+  const url = urlOf(source);
+  if (url !== undefined && nodeModule("node:fs") && isPath(url)) throw new TetralodError("bad-source", `${url}: ${NO_PATH}`);
+  if (url?.startsWith("file:") && nodeModule("node:fs")) return openFile(url);
+  if (url !== undefined) return openResponse(await request(source as string | URL | Request, url, { signal, headers, credentials }), url);
+  if (isInstance(source, "Response")) return openResponse(source, source.url || "response");
+  if (isInstance(source, "Blob")) return open(source.name || "blob", source.size, source.stream());
+  const bytes = bytesOf(source);
+  if (bytes) return { name: "bytes", total: bytes.byteLength, chunks: pieces(bytes) };
+  return open("stream", undefined, source);
+}
+
+/** What takes the chunks of a source. */
+interface Sink {
+  feed(chunk: Bytes): unknown;
+  finish(): unknown;
+}
+
+/**
+ * Feeds every chunk to `feed`, waits for each before it reads on, and calls `finish` at the end. Errors of the decoder,
+ * which does not know what it decodes, come out with the name of the source. The end of the signal ends a wait at once; the promise then
+ * rejects with its reason.
+ */
+export async function pump({ name, chunks }: OpenSource, { feed, finish }: Sink, signal?: AbortSignal) {
+  try {
+    for (;;) {
+      const { done, value } = await abortable(chunks.next(), signal);
+      if (done) break;
+      await abortable(feed(value), signal);
+    }
+    await abortable(finish(), signal);
+  } catch (error) {
+    throw naming(name, error);
+  } finally {
+    // Not awaited: a source that hangs must not hold up the error. After the end this does nothing.
+    Promise.resolve(chunks.return?.()).catch(() => {});
+  }
+}
+
+/** What the decoder says of a file. */
+const DECODING = ["not-mt", "unsupported-version", "corrupt", "truncated", "limit"];
+
+const naming = (name: string, error: unknown) =>
+  error instanceof TetralodError && DECODING.includes(error.code) ? ofFile(name, error) : error;
+
+/** `promise`, or the signal's reason as soon as it fires. */
+export async function abortable<T>(promise: T | Promise<T>, signal: AbortSignal | undefined): Promise<T> {
+  if (!signal) return promise;
+  return new Promise((resolve, reject) => {
+    const onAbort = () => reject(signal.reason);
+    if (signal.aborted) onAbort();
+    signal.addEventListener("abort", onAbort, { once: true });
+    Promise.resolve(promise)
+      .then(resolve, reject)
+      .finally(() => signal.removeEventListener("abort", onAbort));
+  });
+}
+
+async function request(source: string | URL | Request, url: string, options: Along & { signal?: AbortSignal }): Promise<Response> {
+  try {
+    // A Request keeps what is not said otherwise; undefined would say otherwise.
+    const said = Object.entries(options).filter(([, value]) => value !== undefined);
+    return await fetch(source, Object.fromEntries(said));
+  } catch (error) {
+    options.signal?.throwIfAborted();
+    const { name, message, cause } = known(error);
+    if (name === "AbortError") throw error;
+    throw new TetralodError("network", `${url}: ${cause?.message ?? message}`, { cause: error });
+  }
+}
+
+function openResponse(response: Response, name: string): OpenSource {
+  if (!response.ok) {
+    response.body?.cancel().catch(() => {});
+    throw new TetralodError("network", `${name}: HTTP ${response.status} ${response.statusText}`.trimEnd());
+  }
+  if (response.bodyUsed || !response.body) throw new TetralodError("bad-source", `${name}: the response has no unread body`);
+  // Under a content encoding the length counts the packed bytes, which never pass through here.
+  const packed = response.headers.get("content-encoding");
+  const length = packed && packed !== "identity" ? null : response.headers.get("content-length");
+  return open(name, length === null ? undefined : Number(length), response.body);
+}
+
+async function openFile(url: string): Promise<OpenSource> {
+  const { promises, createReadStream } = nodeModule("node:fs");
+  const { size } = await promises.stat(new URL(url)).catch((error: Error) => {
+    throw new TetralodError("network", `${url}: ${error.message}`, { cause: error });
+  });
+  return open(url, size, createReadStream(new URL(url)));
+}
+
+function open(name: string, total: number | undefined, source: unknown): OpenSource {
+  const iterator = iteratorOf(source);
+  if (!iterator) throw new TetralodError("bad-source", `cannot read from ${describe(source)}: ${KINDS}`);
+  return { name, total, chunks: named(iterator, name) };
+}
+
+const KINDS = "give a URL, Request, Response, Blob, ArrayBuffer, Uint8Array, ReadableStream or async iterable of Uint8Array";
+
+const NO_PATH = 'a path is no URL; in Node, give pathToFileURL(path) of "node:url"';
+
+/** Whether a text is no URL, or begins with the letter of a drive. */
+const isPath = (text: string) => !URL.canParse(text) || /^[a-z]:[\\/]/i.test(text);
+
+/** What gives chunks, of which nothing is known. */
+interface Unknowns {
+  next(): IteratorResult<unknown> | Promise<IteratorResult<unknown>>;
+  return?(): unknown;
+}
+
+function iteratorOf(source: unknown): Unknowns | undefined {
+  const { getReader, [Symbol.asyncIterator]: later, [Symbol.iterator]: now } = Object(source);
+  if (typeof getReader === "function") return readerIterator(source as ReadableStream);
+  return (later ?? now)?.call(source);
+}
+
+/** Not every browser can iterate a stream; every one has readers. */
+function readerIterator(stream: ReadableStream<unknown>): Unknowns {
+  const reader = stream.getReader();
+  return { next: () => reader.read() as Promise<IteratorResult<unknown>>, return: () => reader.cancel() };
+}
+
+/** `iterator` with chunks that are checked and own their buffers, and with failures that name the source. */
+function named(iterator: Unknowns, name: string): Chunks {
+  return {
+    async next() {
+      const { done, value } = await nextOf(iterator, name);
+      return done ? { done, value: undefined } : { done: false, value: owned(value, name) };
+    },
+    return: () => iterator.return?.(),
+  };
+}
+
+async function nextOf(iterator: Unknowns, name: string): Promise<IteratorResult<unknown>> {
+  try {
+    return await iterator.next();
+  } catch (error) {
+    const { name: kind, message } = known(error);
+    if (kind === "AbortError") throw error;
+    throw new TetralodError("network", `${name}: ${message ?? error}`, { cause: error });
+  }
+}
+
+function owned(chunk: unknown, name: string): Bytes {
+  const bytes = bytesOf(chunk);
+  if (!bytes) throw new TetralodError("bad-source", `${name}: gave ${describe(chunk)} where a Uint8Array belongs`);
+  return bytes.slice();
+}
+
+async function* pieces(bytes: Uint8Array): AsyncGenerator<Bytes, undefined> {
+  for (let at = 0; at < bytes.byteLength; at += PIECE) yield bytes.slice(at, at + PIECE);
+}
+
+function bytesOf(value: unknown): Uint8Array | undefined {
+  if (value instanceof ArrayBuffer) return new Uint8Array(value);
+  if (!ArrayBuffer.isView(value)) return undefined;
+  // A plain Uint8Array over the same bytes: `slice` of a Node Buffer would share its pool.
+  return new Uint8Array(value.buffer, value.byteOffset, value.byteLength);
+}
+
+/** What `Ranges` needs to fetch a file in parts: its address, and what goes along; or a file of the user, and its name. */
+export interface RangesSource {
+  url: string;
+  headers?: [string, string][];
+  credentials?: RequestCredentials;
+  blob?: Blob;
+  name?: string;
+}
+
+/** The same of `source`, if that is a file on a server or of the user. */
+export function rangesOf(source: Source, { headers, credentials }: Along = {}): RangesSource | undefined {
+  // A Blob without content is a file that ended too early. Node 20 crashes when a worker reads a Blob that is backed by a file.
+  if (isInstance(source, "Blob") && source.size > 0 && !nodeModule("node:worker_threads")) {
+    const name = source.name || "blob";
+    return { url: `blob:${encodeURIComponent(name)}`, blob: source, name };
+  }
+  const given = urlOf(source);
+  const url = given === undefined ? "" : absolute(given);
+  if (!/^https?:/.test(url)) return undefined;
+  const request = isInstance(source, "Request") ? source : undefined;
+  if (request && request.method !== "GET") return undefined;
+  const own = new Headers(request?.headers);
+  new Headers(headers).forEach((value, name) => own.set(name, value));
+  return { url, headers: [...own], credentials: credentials ?? request?.credentials };
+}
+
+/** Whether `source` can be read again. */
+export function isRepeatable(source: Source): boolean {
+  if (isInstance(source, "Request")) return source.method === "GET";
+  return urlOf(source) !== undefined || isInstance(source, "Blob") || source instanceof ArrayBuffer || ArrayBuffer.isView(source);
+}
+
+/** `url` as it means the same in a worker; as it is where it means nothing. */
+function absolute(url: string): string {
+  try {
+    return new URL(url, globalThis.location?.href).href;
+  } catch {
+    return url;
+  }
+}
+
+function urlOf(source: Source): string | undefined {
+  if (typeof source === "string") return source;
+  if (source instanceof URL) return source.href;
+  return isInstance(source, "Request") ? source.url : undefined;
+}
+
+/** Classes that a runtime may lack. */
+interface Classes {
+  Request: Request;
+  Response: Response;
+  Blob: Blob & { name?: string };
+}
+
+/** `instanceof` for these. */
+function isInstance<Name extends keyof Classes>(value: unknown, name: Name): value is Classes[Name] {
+  return typeof globalThis[name] === "function" && value instanceof globalThis[name];
+}
+
+function describe(value: unknown): string {
+  return value === null ? "null" : typeof value === "object" ? `a ${value.constructor?.name ?? "object"}` : `a ${typeof value}`;
+}
+
+/** A built-in module of Node, found in a way that no bundler tries to follow; `undefined` elsewhere. */
+export function nodeModule(name: string): any {
+  const { process } = globalThis as { process?: { getBuiltinModule?(name: string): unknown } };
+  return process?.getBuiltinModule?.(name);
+}
