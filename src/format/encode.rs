@@ -1,6 +1,7 @@
 //! An MT to bytes: the same MT and options give the same bytes everywhere.
 //!
-//! Blocks of the kinds that come in parts are counted and written in parallel. What the index says of a block comes from a run through the MT
+//! Half-edge files have an index, and blocks that need no others: these are counted and written in parallel. Files of the other kinds are read
+//! from front to back; each block says how large the errors behind it are. What the index says of a block comes from a run through the MT
 //! (`block_scan`), or, of a half-edge MT that has just been made, from what its builder has noted (`mt::facts`): files are the same either way.
 
 use super::block_scan::BlockScan;

@@ -1,8 +1,7 @@
 //! Updates that come and go in pages, and rows of different lengths to keep them in.
 //!
-//! A page is a block of a file in memory: it is inserted and evicted as a whole, and an update whose page is not here counts as absent. A page
-//! of an edge-based MT needs the pages on which it depends. A page of a half-edge MT does not, and what is applied does not depend on the order
-//! in which pages arrive.
+//! A page is a block of a half-edge file in memory: it is inserted and evicted as a whole, and an update whose page is not here counts as absent.
+//! A page is used without the pages on which it depends, and what is applied does not depend on the order in which pages arrive.
 
 use super::update_errors::Errors;
 use super::{ErrorCode, PageError, UpdateId};

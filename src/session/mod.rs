@@ -4,10 +4,9 @@
 //! [`Session::view`] or as a surface with [`Session::isosurface`]. Everything works while the file is still
 //! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
 //!
-//! Of a file elsewhere a session plans which blocks to fetch: those in whose boxes something may violate the request and those that these depend
-//! on, the largest excess of error per byte first, as far as memory allows (`blocks`). When memory is short, blocks that the request does not need
-//! are evicted, children before parents, those first that have not been needed for the longest time. A block with an applied update stays, and
-//! so do the blocks on which it depends.
+//! Of a file elsewhere a session plans which blocks to fetch: those that the mesh asks for, or for uniform requests those with errors beyond
+//! what is allowed, the largest excess of error per byte first, as far as memory allows (`blocks`). When memory is short, blocks that the
+//! request does not need are evicted, those first that have not been needed for the longest time. A block with an applied update stays.
 
 mod behind;
 mod block_state;

@@ -7,6 +7,8 @@ use crate::listed::not_read;
 #[cfg(not(target_arch = "wasm32"))]
 use crate::{CellData, ReadOptions, formats};
 use crate::{MemoryLimit, foreign, image, legacy, packed, raw, structured, vtu, xml};
+#[cfg(not(target_arch = "wasm32"))]
+use tetralod::mesh::Field;
 
 /// Says what is in the bytes of a file; `name` is used in errors alone. No array is decoded, so this takes little memory
 /// beside the bytes.

@@ -1,6 +1,6 @@
 //! Edge-based Multi-Tessellations [§2.1, §4]: updates are vertex splits, their inverses edge collapses.
 //!
-//! A page is an array of records of equal length (`Record` in `store`), with the errors beside it. Masks and offsets are residuals against a
+//! Updates are an array of records of equal length (`Record` in `store`), with the errors beside it. Masks and offsets are residuals against a
 //! prediction from the star (`predict`), which is made when a split is applied: decoding a block needs no mesh. A collapse needs no offset, as
 //! it goes to the midpoint.
 //!

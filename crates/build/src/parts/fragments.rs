@@ -2,7 +2,7 @@
 
 use super::PartsError;
 use super::piece::{Made, Piece};
-use super::piecewise::{Prepared, Stored, Whole};
+use super::prepared::{Prepared, Stored, Whole};
 use crate::BuildError;
 use crate::lattice::location;
 use crate::lattice::quantize::Quantized;

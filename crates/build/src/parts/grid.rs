@@ -3,7 +3,7 @@
 //! The parts are those that [`part`](super::part) makes of the grid's points and tetrahedra, byte for byte.
 
 use super::PartsError;
-use super::partition::{CUT_BITS, best_cut, shift};
+use super::cut::{CUT_BITS, best_cut, shift};
 use super::piece::{Head, Part, Piece};
 use super::plan::{Node, Plan};
 use crate::error::points::as_vec;

@@ -79,6 +79,7 @@
 //! ```
 
 mod assemble;
+mod cut;
 mod fragments;
 mod grid;
 mod node;
@@ -86,6 +87,7 @@ mod partition;
 mod piece;
 mod piecewise;
 mod plan;
+mod prepared;
 mod wire;
 
 pub use assemble::assemble;

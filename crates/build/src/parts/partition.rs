@@ -3,6 +3,7 @@
 //! A tetrahedron is where its lowest corner is along the axis of a cut: the six of a grid's cube stay together, so cuts of grids are flat.
 
 use super::PartsError;
+use super::cut::{CUT_BITS, best_cut, shift};
 use super::grid::GridCut;
 use super::piece::{Head, Made, Part, Piece};
 use super::plan::{MOST_PARTS, Node, Plan};
@@ -86,9 +87,6 @@ fn checksum(mesh: &TetMesh) -> u32 {
     hasher.finalize()
 }
 
-/// Bits of a place along an axis that tell where it may be cut.
-pub(super) const CUT_BITS: u32 = 12;
-
 /// The part of each tetrahedron.
 fn parts_of(tets: &[[u32; 4]], quantized: &Quantized, parts: u32) -> Result<Vec<u16>, PartsError> {
     let positions = &quantized.positions;
@@ -121,39 +119,6 @@ fn parts_of(tets: &[[u32; 4]], quantized: &Quantized, parts: u32) -> Result<Vec<
         }
     }
     Ok(part_of)
-}
-
-/// By how many bits positions on a lattice, which go up to `2^bits`, are shifted to tell where they may be cut.
-pub(super) fn shift(bits: u32) -> u32 {
-    (bits + 1).saturating_sub(CUT_BITS)
-}
-
-/// The longest axis along which tetrahedra can be cut, and the first place behind the cut, given their places along each axis: the least
-/// and the largest, and how many there are at each.
-pub(super) fn best_cut(
-    spans: &[[usize; 2]; 3],
-    counts: &[Vec<u32>; 3],
-    step: [f64; 3],
-) -> Option<(usize, usize)> {
-    let length = |axis: usize| (spans[axis][1].saturating_sub(spans[axis][0])) as f64 * step[axis];
-    let mut axes = [0, 1, 2];
-    axes.sort_by(|&a, &b| length(b).total_cmp(&length(a)));
-    axes.into_iter().find_map(|axis| Some((axis, half(&counts[axis])?)))
-}
-
-/// Where to cut so that both sides have about as many; none if one would have nothing.
-fn half(counts: &[u32]) -> Option<usize> {
-    let all: u64 = counts.iter().map(|&n| u64::from(n)).sum();
-    let mut below = 0_u64;
-    let mut best: Option<(u64, usize)> = None;
-    for (x, &n) in counts.iter().enumerate() {
-        let off = below.abs_diff(all - below);
-        if below > 0 && below < all && best.is_none_or(|(least, _)| off < least) {
-            best = Some((off, x));
-        }
-        below += u64::from(n);
-    }
-    best.map(|(_, x)| x)
 }
 
 /// A mesh with its parts.
