@@ -14,8 +14,9 @@ use tetralod::mt::MtKind;
 use tetralod::refine::{Need, Request};
 use tetralod::session::Session;
 use tetralod_build::{BuildConfig, build};
+use tetralod_render::SceneRenderer;
 use tetralod_render::gpu::{Context, Renderer, wait, wgpu};
-use tetralod_render::scene::{IsosurfaceState, Scene, SceneState, VolumeState};
+use tetralod_render::scene::{IsosurfaceState, SceneState, VolumeState};
 
 const SIZE: [u32; 2] = [640, 480];
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -90,7 +91,7 @@ fn draw(program: &Program, file: &[u8]) -> Result<Vec<u8>, Box<dyn Error>> {
     // A renderer on the program's device: handles of wgpu are cheap to copy.
     let context = Context::of(program.adapter.clone(), program.device.clone(), program.queue.clone());
     let renderer = Renderer::with_device(context, SIZE, FORMAT)?;
-    let mut scene = Scene::new(renderer);
+    let mut scene = SceneRenderer::new(renderer);
     scene.set_state(SceneState {
         isosurfaces: vec![IsosurfaceState::default()],
         volume: Some(VolumeState::default()),

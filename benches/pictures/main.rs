@@ -16,10 +16,11 @@ use tetralod::refine::Request;
 use tetralod::session::Session;
 use tetralod_build::Purpose;
 use tetralod_io::generate;
+use tetralod_render::SceneRenderer;
 use tetralod_render::gpu::{Renderer, wait};
 use tetralod_render::scene::{
-    ArrowState, BoundaryState, CellKind, CellState, IsosurfaceState, PlaneState, Scene, SceneState,
-    SliceState, StreamlineState, VolumeState,
+    ArrowState, BoundaryState, CellKind, CellState, IsosurfaceState, PlaneState, SceneState, SliceState,
+    StreamlineState, VolumeState,
 };
 
 /// Whatever goes wrong: this is a tool, it says so and ends.
@@ -202,7 +203,7 @@ fn measure(options: &Options, bytes: &[u8], tets: u32, mode: &str) -> Result<()>
     let positions = session.view().positions;
     let bounds = positions.iter().fold(Bounds::EMPTY, |bounds, p| bounds.with(p.map(f64::from)));
     let about = About { bounds, range, field };
-    let mut scene = Scene::new(wait(Renderer::headless(options.size))?);
+    let mut scene = SceneRenderer::new(wait(Renderer::headless(options.size))?);
     let mut camera = Camera::home(&about.bounds, f64::from(options.size[0]) / f64::from(options.size[1]));
     let state = |moved| about.state(mode, moved).ok_or_else(|| format!("there is no mode {mode}"));
     let (mut computed, mut drawn) = (Vec::new(), Vec::new());
@@ -241,7 +242,7 @@ fn measure(options: &Options, bytes: &[u8], tets: u32, mode: &str) -> Result<()>
 }
 
 /// Seconds until the device has finished a picture.
-fn picture(scene: &mut Scene, session: &mut Session, camera: &Camera) -> Result<f64> {
+fn picture(scene: &mut SceneRenderer, session: &mut Session, camera: &Camera) -> Result<f64> {
     let start = Instant::now();
     scene.draw(session, camera)?;
     while scene.renderer().in_flight()? > 0 {

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::geom::{Bounds, Camera, CameraState, Projection, ViewPreset};
 use tetralod_render::gpu::{GpuError, Renderer, wait};
-use tetralod_render::scene::{Background, Legend, Scene, SceneError};
+use tetralod_render::scene::{Background, Legend};
+use tetralod_render::{SceneRenderer, ShowError};
 
 const PICTURE: &str = "Picture";
 const CAMERA: &str = "Camera";
@@ -219,7 +220,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     shown::warnings(&state, &about).iter().for_each(|warning| output::note(&format!("warning: {warning}")));
     let is_transparent = state.background == Background::Transparent;
     let camera = arguments.placed.camera(&about.bounds, f64::from(size[0]) / f64::from(size[1]));
-    let mut scene = Scene::new(renderer);
+    let mut scene = SceneRenderer::new(renderer);
     scene.set_pixel_ratio([0, 1].map(|k| size[k] as f32 / USUAL[k] as f32).into_iter().fold(1.0, f32::max));
     scene.set_state(state).map_err(explained)?;
     let session = &mut answer.opened.session;
@@ -283,7 +284,7 @@ fn print_scene(arguments: &Arguments) -> Result<()> {
 /// A renderer of pictures of this size.
 fn renderer(size: [u32; 2]) -> Result<Renderer> {
     // The longest row that the device has shows how large pictures can be, and takes little memory.
-    let mut renderer = wait(Renderer::headless([u32::MAX, 1])).map_err(|error| explained(error.into()))?;
+    let mut renderer = wait(Renderer::headless([u32::MAX, 1])).map_err(explained)?;
     let [longest, _] = renderer.size();
     if size.iter().any(|side| *side > longest) {
         let [width, height] = size;
@@ -298,17 +299,17 @@ fn renderer(size: [u32; 2]) -> Result<Renderer> {
 }
 
 /// What is wrong and what to do, on the command line.
-fn explained(error: SceneError) -> anyhow::Error {
-    match error {
-        SceneError::Gpu(GpuError::NoAdapter(why)) => anyhow!(
+fn explained(error: impl Into<ShowError>) -> anyhow::Error {
+    match error.into() {
+        ShowError::Gpu(GpuError::NoAdapter(why)) => anyhow!(
             "there is no Vulkan adapter to draw with ({why}); install the driver of the GPU, or \
              Mesa's software driver (package mesa-vulkan-drivers of Debian, Ubuntu and Fedora, vulkan-swrast \
              of Arch Linux)"
         ),
-        SceneError::Gpu(GpuError::NoDevice(why)) => {
+        ShowError::Gpu(GpuError::NoDevice(why)) => {
             anyhow!("the GPU cannot be opened: {why}; end other programs that use it")
         }
-        SceneError::Gpu(GpuError::DeviceLost(why)) => {
+        ShowError::Gpu(GpuError::DeviceLost(why)) => {
             anyhow!("the GPU was lost: {why}; draw a smaller --size or a mesh of a smaller --budget")
         }
         // The text of these holds that of their cause.

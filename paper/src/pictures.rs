@@ -6,9 +6,8 @@ use std::io::BufWriter;
 use std::path::Path;
 use tetralod::geom::Camera;
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Triangles, VIRIDIS};
-use tetralod_render::gpu::{
-    BoxLines, CellStyle, Colouring, EdgeLook, GpuError, Lighting, Look, Renderer, Style, wait,
-};
+use tetralod_render::draw::{BoxLines, CellStyle, Colouring, EdgeLook, Lighting, Look, Style};
+use tetralod_render::gpu::{GpuError, Renderer, wait};
 
 use crate::figures::Pair;
 use crate::query::Shown;

@@ -10,7 +10,8 @@ use tetralod::mesh::NONE;
 use tetralod::refine::{Budget, Need, Request};
 use tetralod::session::Session;
 use tetralod::view::{IsoSurface, Medium, Triangles};
-use tetralod_render::gpu::{CellShape, CellStyle, Look, Renderer, Style};
+use tetralod_render::draw::{CellShape, CellStyle, Look, Style};
+use tetralod_render::gpu::Renderer;
 
 const SIZE: [u32; 2] = [120, 90];
 

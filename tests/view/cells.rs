@@ -7,7 +7,8 @@ use glam::{DVec2, DVec3};
 use tetralod::geom::{Camera, Projection};
 use tetralod::mesh::FACES;
 use tetralod::view::{ClipPlane, ColourScale, VIRIDIS};
-use tetralod_render::gpu::{CellShape, CellStyle, Colouring, Look, Renderer, Style};
+use tetralod_render::draw::{CellShape, CellStyle, Colouring, Look, Style};
+use tetralod_render::gpu::Renderer;
 
 const SIZE: [u32; 2] = [160, 120];
 

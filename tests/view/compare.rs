@@ -9,10 +9,9 @@ use tetralod::mt::Mt;
 use tetralod::refine::Request;
 use tetralod::session::Session;
 use tetralod::view::Difference;
+use tetralod_render::SceneRenderer;
 use tetralod_render::gpu::{Renderer, wait};
-use tetralod_render::scene::{
-    CellState, CompareState, IsosurfaceState, Scene, SceneState, SliceState, VolumeState,
-};
+use tetralod_render::scene::{CellState, CompareState, IsosurfaceState, SceneState, SliceState, VolumeState};
 
 const SIZE: [u32; 2] = [96, 64];
 
@@ -32,7 +31,7 @@ fn camera() -> Camera {
 }
 
 /// Rows of pixels.
-fn picture(scene: &mut Scene, session: &mut Session) -> Vec<Vec<[u8; 4]>> {
+fn picture(scene: &mut SceneRenderer, session: &mut Session) -> Vec<Vec<[u8; 4]>> {
     scene.update(session).expect("it fits");
     let bytes = wait(scene.picture(session, &camera(), 1, |_| {})).expect("a picture");
     bytes.as_chunks().0.chunks(SIZE[0] as usize).map(<[_]>::to_vec).collect()
@@ -43,8 +42,8 @@ fn half(picture: &[Vec<[u8; 4]>], left: bool) -> Vec<&[[u8; 4]]> {
     picture.iter().map(|row| if left { &row[..middle] } else { &row[middle..] }).collect()
 }
 
-fn scene(renderer: Renderer, state: &SceneState) -> Scene {
-    let mut scene = Scene::new(renderer);
+fn scene(renderer: Renderer, state: &SceneState) -> SceneRenderer {
+    let mut scene = SceneRenderer::new(renderer);
     scene.set_state(state.clone()).expect("a good state");
     scene
 }

@@ -5,10 +5,11 @@ use crate::support::meshes::{cube, hilly};
 use crate::twin;
 use tetralod::geom::{Bounds, Camera};
 use tetralod::mesh::Field;
+use tetralod_render::SceneRenderer;
 use tetralod_render::gpu::wait;
 use tetralod_render::scene::{
-    ArrowState, BoundaryState, CellState, ColourState, IsosurfaceState, PlaneState, Scene, SceneState,
-    SliceState, StreamlineState, VolumeState,
+    ArrowState, BoundaryState, CellState, ColourState, IsosurfaceState, PlaneState, SceneState, SliceState,
+    StreamlineState, VolumeState,
 };
 
 const SIZE: [u32; 2] = [120, 100];
@@ -109,7 +110,7 @@ fn pictures(frame: &Frame) -> Vec<Picture> {
         mesh.fields.push(Field::new(name.to_owned(), unit.positions.iter().map(|p| component(*p)).collect()));
     }
     let mut session = opened(&mesh);
-    let mut scene = Scene::new(twin::renderer(SIZE));
+    let mut scene = SceneRenderer::new(twin::renderer(SIZE));
     let bounds = Bounds { min: frame.point([0.0; 3]), max: frame.point([1.0; 3]) };
     let camera = Camera::home(&bounds, twin::aspect(SIZE));
     let mut all = Vec::new();

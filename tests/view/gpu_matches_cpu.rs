@@ -6,7 +6,8 @@ use crate::twin::{self, AROUND, Difference, Hit, Lights, Triangle, UNIT, picture
 use glam::DVec3;
 use tetralod::geom::Camera;
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Light, Medium, Probe, Triangles, VIRIDIS};
-use tetralod_render::gpu::{BoxLines, CellStyle, Colouring, Look, Renderer, Style};
+use tetralod_render::draw::{BoxLines, CellStyle, Colouring, Look, Style};
+use tetralod_render::gpu::Renderer;
 
 const SIZE: [u32; 2] = [160, 120];
 /// What a pixel shows when all of it shows the same kind of thing.

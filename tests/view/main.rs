@@ -19,6 +19,7 @@ mod mixed_pictures;
 mod pick;
 mod probe;
 mod samples;
+mod scene_list;
 mod scene_pick;
 mod scenes;
 mod shade;

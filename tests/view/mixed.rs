@@ -6,7 +6,8 @@ use crate::twin::{self, AROUND, Hit, Lights, Triangle};
 use glam::DVec3;
 use tetralod::geom::{Camera, Ray};
 use tetralod::view::{ClipPlane, Light, Medium, Probe, Span, Triangles};
-use tetralod_render::gpu::{Look, Renderer, Style};
+use tetralod_render::draw::{Look, Style};
+use tetralod_render::gpu::Renderer;
 
 /// A surface of a mixed picture.
 pub struct Part {

@@ -6,7 +6,8 @@ use crate::scenes::Scene;
 use crate::twin::{self, UNIT};
 use tetralod::geom::{Camera, Projection};
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Medium, Plane, Slice, Triangles, VIRIDIS};
-use tetralod_render::gpu::{Colouring, Lighting, Look, Renderer, SIDES, Style, wait};
+use tetralod_render::draw::{Colouring, Lighting, Look, SIDES, Style};
+use tetralod_render::gpu::{Renderer, wait};
 
 const SIZE: [u32; 2] = [96, 72];
 

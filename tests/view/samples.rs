@@ -5,7 +5,8 @@ use crate::scenes::Scene;
 use crate::twin::{self, UNIT};
 use tetralod::geom::Camera;
 use tetralod::view::{IsoSurface, Medium, Triangles};
-use tetralod_render::gpu::{BoxLines, Look, Renderer, Style, wait};
+use tetralod_render::draw::{BoxLines, Look, Style};
+use tetralod_render::gpu::{Renderer, wait};
 
 const SIZE: [u32; 2] = [120, 90];
 /// Pixels of the large picture for each of the small one, along each side.

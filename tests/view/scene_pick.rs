@@ -7,8 +7,9 @@ use tetralod::geom::Ray;
 use tetralod::mt::Mt;
 use tetralod::refine::Request;
 use tetralod::session::Session;
+use tetralod_render::SceneRenderer;
 use tetralod_render::scene::{
-    ArrowState, BoundaryState, PlaneState, Scene, SceneState, SliceState, StreamlineState,
+    ArrowState, BoundaryState, PlaneState, SceneState, SliceState, StreamlineState,
 };
 
 const ONE: fn([f64; 3]) -> f64 = |_| 1.0;
@@ -26,7 +27,12 @@ fn opened() -> (Session, [String; 3]) {
 }
 
 /// Where a ray from below, upwards through (x, y), meets what is shown.
-fn height(scene: &mut Scene, session: &mut Session, state: &SceneState, [x, y]: [f64; 2]) -> Option<f64> {
+fn height(
+    scene: &mut SceneRenderer,
+    session: &mut Session,
+    state: &SceneState,
+    [x, y]: [f64; 2],
+) -> Option<f64> {
     scene.set_state(state.clone()).expect("a good state");
     scene.update(session).expect("it fits");
     let ray = Ray { origin: [x, y, -2.0].into(), direction: [0.0, 0.0, 1.0].into() };
@@ -40,7 +46,7 @@ fn height(scene: &mut Scene, session: &mut Session, state: &SceneState, [x, y]: 
 fn tubes_and_arrows_are_found() {
     let renderer = twin::renderer([8, 8]);
     let (mut session, fields) = opened();
-    let mut scene = Scene::new(renderer);
+    let mut scene = SceneRenderer::new(renderer);
     let tubes = StreamlineState {
         fields: fields.clone(),
         seeds: vec![[0.5; 3]],
@@ -67,7 +73,7 @@ fn tubes_and_arrows_are_found() {
 fn planes_cut_what_they_cut_in_the_picture() {
     let renderer = twin::renderer([8, 8]);
     let (mut session, _) = opened();
-    let mut scene = Scene::new(renderer);
+    let mut scene = SceneRenderer::new(renderer);
     let low = PlaneState { normal: [0.0, 0.0, -1.0], offset: -0.3 };
     let mut height = |state: &SceneState| height(&mut scene, &mut session, state, [0.41, 0.37]);
     for (clipped, expected) in [(true, 0.3), (false, 0.0)] {

@@ -4,7 +4,8 @@ use crate::twin::{self, UNIT};
 use glam::DVec3;
 use tetralod::geom::{Bounds, Camera, Projection};
 use tetralod::view::Triangles;
-use tetralod_render::gpu::{Colouring, Lighting, Look, Renderer, Style};
+use tetralod_render::draw::{Colouring, Lighting, Look, Style};
+use tetralod_render::gpu::Renderer;
 
 const SIZE: [u32; 2] = [240, 180];
 

@@ -5,7 +5,8 @@ use crate::scenes::Scene;
 use crate::twin::{self, AROUND, Triangle, UNIT};
 use tetralod::geom::Camera;
 use tetralod::view::{IsoSurface, Triangles};
-use tetralod_render::gpu::{Colouring, Look, Renderer, Style};
+use tetralod_render::draw::{Colouring, Look, Style};
+use tetralod_render::gpu::Renderer;
 
 const SIZE: [u32; 2] = [400, 300];
 const RED: [f32; 3] = [1.0, 0.0, 0.0];

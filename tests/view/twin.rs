@@ -7,7 +7,8 @@ use glam::{DVec2, DVec3};
 use std::path::Path;
 use tetralod::geom::{Bounds, Camera, Ray};
 use tetralod::view::{Medium, Triangles};
-use tetralod_render::gpu::{Colouring, Lighting, Look, Renderer, Style, wait};
+use tetralod_render::draw::{Colouring, Lighting, Look, Style};
+use tetralod_render::gpu::{Renderer, wait};
 
 pub const UNIT: Bounds = Bounds { min: [0.0; 3], max: [1.0; 3] };
 

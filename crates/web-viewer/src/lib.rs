@@ -18,8 +18,9 @@ use tetralod::refine::{Part, View};
 use tetralod::session::MappedBlock;
 use tetralod::view::BoxEdge;
 use tetralod::view::gizmo::{self, BoxFace};
+use tetralod_render::SceneRenderer;
 use tetralod_render::gpu::{Renderer, SideTarget};
-use tetralod_render::scene::{Legend, Scene, SceneState};
+use tetralod_render::scene::{Legend, SceneState};
 use tetralod_web::arrays::{doubles, list, object, objects, set};
 use tetralod_web::error::WebError;
 use tetralod_web::file::File;
@@ -47,7 +48,7 @@ pub struct Viewer {
     pub(crate) file: File,
     /// What takes the place of `file` when its first bytes are here.
     next: Option<File>,
-    pub(crate) scene: Scene,
+    pub(crate) scene: SceneRenderer,
     pub(crate) camera: Camera,
     pub(crate) ratio: f64,
     /// The view that the needs which follow the camera have now.
@@ -112,7 +113,7 @@ impl Viewer {
     pub fn new(gpu: Gpu, ratio: f32) -> Viewer {
         let Gpu(renderer) = gpu;
         let camera = Camera::home(&Bounds::EMPTY, renderer.aspect());
-        let mut scene = Scene::new(renderer);
+        let mut scene = SceneRenderer::new(renderer);
         scene.set_pixel_ratio(ratio);
         Self {
             file: File::default(),

@@ -15,7 +15,8 @@ async fn the_renderer_draws_the_isosurface() {
     use tetralod::refine::Request;
     use tetralod::session::Session;
     use tetralod::view::Triangles;
-    use tetralod_render::gpu::{Look, Renderer};
+    use tetralod_render::draw::Look;
+    use tetralod_render::gpu::Renderer;
 
     const SIZE: [u32; 2] = [128, 96];
     let mut session = Session::new();
@@ -42,7 +43,8 @@ async fn a_surface_is_kept_up_by_what_has_changed() {
     use tetralod::refine::{Need, Request};
     use tetralod::session::Session;
     use tetralod::view::Triangles;
-    use tetralod_render::gpu::{Look, Renderer};
+    use tetralod_render::draw::Look;
+    use tetralod_render::gpu::Renderer;
 
     const SIZE: [u32; 2] = [96, 96];
     let mut session = Session::new();

@@ -1,10 +1,11 @@
 //! Draws tetrahedra as they are, or the points of the mesh.
 
+use crate::draw::{CellShape, CellStyle};
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::cell_parts::{edges, outer_faces};
 use crate::gpu::mesh::MeshBuffers;
 use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
-use crate::gpu::style::{CellShape, CellStyle, StyleUniform};
+use crate::gpu::style::StyleUniform;
 use crate::gpu::{Context, GpuError};
 use tetralod::geom::{SinglePoints, SingleValues};
 use tetralod::view::MeshView;

@@ -28,7 +28,7 @@ pub enum GpuError {
         limit: u64,
     },
     /// The device is lost (driver reset, GPU unplugged, too little memory): make a new renderer, and give it to
-    /// [`Scene::set_renderer`](crate::scene::Scene::set_renderer).
+    /// [`SceneRenderer::set_renderer`](crate::SceneRenderer::set_renderer).
     #[error("the GPU was lost: {0}; create the viewer again")]
     DeviceLost(String),
     /// The device refused an operation.

@@ -1,5 +1,5 @@
 //! The renderer, on wgpu: WebGPU in the browser, Vulkan in native programs. It uses no MT: it draws slices of numbers, such as
-//! those that [`tetralod::view`] computes.
+//! those that [`tetralod::view`] computes, one by one or as a list of [edits](crate::draw::Edit).
 //!
 //! A [`Renderer`] owns a [`Context`] (the device), a target (a canvas, an image to read back, or views that the caller gives),
 //! and the things that are drawn: the mesh as a volume or as tetrahedra, surfaces of triangles, and boxes. What is opaque is
@@ -11,6 +11,7 @@ mod cell_parts;
 mod cells;
 mod composite;
 mod context;
+mod edits;
 mod error;
 mod fragments;
 mod mesh;
@@ -36,11 +37,6 @@ pub use error::GpuError;
 pub use renderer::Renderer;
 #[doc(hidden)]
 pub use side_target::SideTarget;
-#[doc(hidden)]
-pub use style::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Style};
-pub use types::Look;
-#[doc(hidden)]
-pub use types::{BoxLines, MOST_CLIPS};
 
 /// Samples per pixel.
 #[doc(hidden)]

@@ -1,5 +1,6 @@
 //! The whole picture: background, mesh, surfaces, boxes.
 
+use crate::draw::{BoxLines, CellStyle, Look, Style};
 use crate::gpu::cells::CellPass;
 use crate::gpu::composite::Composite;
 use crate::gpu::fragments::FragmentLists;
@@ -11,7 +12,7 @@ use crate::gpu::surface::{Surface, SurfacePipelines};
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
 use crate::gpu::wire::WirePass;
-use crate::gpu::{BoxLines, CellStyle, Context, GpuError, Look, Style};
+use crate::gpu::{Context, GpuError};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -246,6 +247,17 @@ impl Renderer {
     /// Removes surface number `key`, and frees its memory.
     pub fn remove_surface(&mut self, key: u32) {
         self.surfaces.remove(&key);
+    }
+
+    /// Draws nothing any more but the boxes.
+    ///
+    /// # Errors
+    /// If the device refuses it.
+    pub fn clear(&mut self) -> Result<(), GpuError> {
+        self.set_split(0.0);
+        self.surfaces.clear();
+        self.set_cells(None);
+        self.set_volume(None)
     }
 
     /// Triangles of all surfaces.

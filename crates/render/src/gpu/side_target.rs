@@ -1,8 +1,9 @@
 //! Pictures of another size beside those on the renderer's own target.
 
+use crate::draw::Look;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::target::Target;
-use crate::gpu::{Context, GpuError, Look, Renderer};
+use crate::gpu::{Context, GpuError, Renderer};
 use std::mem::swap;
 use tetralod::geom::Camera;
 

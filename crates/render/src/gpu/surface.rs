@@ -1,8 +1,9 @@
 //! Draws surfaces of triangles, each with a style of its own.
 
+use crate::draw::Style;
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
-use crate::gpu::style::{Style, StyleUniform};
+use crate::gpu::style::StyleUniform;
 use crate::gpu::{Context, GpuError};
 use tetralod::geom::{SinglePoints, SingleValues};
 use tetralod::view::{SurfaceChanges, Triangles};

@@ -1,61 +1,9 @@
-//! The appearance of the picture, and the uniform of a frame in the layout of the shaders.
+//! The uniform of a frame and the lines of boxes, in the layout of the shaders.
 
+use crate::draw::{Look, MOST_CLIPS};
 use glam::{DMat4, DVec2, DVec3, DVec4};
-use tetralod::geom::{Bounds, Camera, SinglePoints};
+use tetralod::geom::Camera;
 use tetralod::view::ClipPlane;
-
-/// Most planes that cut what is drawn; the six faces of a box count.
-pub const MOST_CLIPS: usize = 16;
-
-/// The appearance of the picture; colours are sRGB from 0 to 1.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Look {
-    /// The background at the top, and its opacity.
-    pub sky: [f32; 4],
-    /// The background at the bottom, and its opacity.
-    pub ground: [f32; 4],
-    /// Pixels of the target per unit of the page's layout: widths of lines scale with it.
-    pub pixel_ratio: f32,
-    /// What is cut away, where the style of a thing does not say otherwise; the first [`MOST_CLIPS`] count.
-    pub clips: Vec<ClipPlane>,
-    /// How dark places get that hardly any light reaches, 0 to 1; and how far away what hides the light may
-    /// be, in model units.
-    pub shade: [f32; 2],
-}
-
-impl Default for Look {
-    fn default() -> Self {
-        Self {
-            sky: [0.075, 0.09, 0.115, 1.0],
-            ground: [0.27, 0.31, 0.365, 1.0],
-            pixel_ratio: 1.0,
-            clips: Vec::new(),
-            shade: [0.0, 1.0],
-        }
-    }
-}
-
-impl Look {
-    /// The look of a model whose points are stored in single precision.
-    pub(super) fn relative_to(&self, single: &SinglePoints) -> Self {
-        let clips = self.clips.iter().map(|clip| clip.relative_to(single)).collect();
-        let [strength, radius] = self.shade;
-        Self { clips, shade: [strength, (f64::from(radius) / single.unit) as f32], ..self.clone() }
-    }
-}
-
-/// The edges of a box, drawn as lines.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoxLines {
-    /// The box.
-    pub bounds: Bounds,
-    /// sRGB and opacity.
-    pub colour: [f32; 4],
-    /// Width in units of the page's layout.
-    pub width: f32,
-    /// Whether each face shows a handle in its middle.
-    pub handles: bool,
-}
 
 /// The uniform `frame` of every shader.
 #[repr(C)]
@@ -153,7 +101,7 @@ fn wide(v: DVec3) -> [f32; 4] {
 mod tests {
     use super::*;
     use std::mem::offset_of;
-    use tetralod::geom::Projection;
+    use tetralod::geom::{Bounds, Projection};
 
     #[test]
     fn twins_have_the_sizes_and_places_that_wgsl_gives_them() {

@@ -1,9 +1,10 @@
 //! Draws boxes as lines, with handles on their faces.
 
+use crate::draw::BoxLines;
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::pipeline::{Common, Output, PipelineSpec, group, group_layout};
 use crate::gpu::types::Line;
-use crate::gpu::{BoxLines, Context, GpuError};
+use crate::gpu::{Context, GpuError};
 use tetralod::geom::{Bounds, SinglePoints};
 use tetralod::view::gizmo::BoxFace;
 

@@ -1,6 +1,5 @@
 //! Why a scene cannot be shown.
 
-use crate::gpu::GpuError;
 use tetralod::Coded;
 use tetralod::session::SessionError;
 use tetralod::view::ScaleError;
@@ -10,9 +9,6 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// The GPU cannot draw it.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
     /// The session cannot give what it shows.
     #[error(transparent)]
     Session(#[from] SessionError),
@@ -38,7 +34,6 @@ impl SceneError {
 impl Coded for SceneError {
     fn code(&self) -> &'static str {
         match self {
-            Self::Gpu(error) => error.code(),
             Self::Session(error) => error.code(),
             Self::State { .. } | Self::Scale(_) => "bad-option",
         }

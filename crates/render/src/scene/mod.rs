@@ -1,9 +1,11 @@
-//! A scene: what is shown of a session's mesh, kept up to date with it, and drawn by the [renderer](crate::gpu).
+//! A scene: what is shown of a session's mesh, kept up to date with it, as a list of what is to be [drawn](crate::draw).
 //!
-//! [`SceneState`] says what is shown, as plain data. [`Scene::update`] computes what is out of date, and hands the renderer what has
-//! changed; nothing is computed that is not shown.
+//! [`SceneState`] says what is shown, as plain data. [`Scene::update`] computes what is out of date, and lists what has changed;
+//! nothing is computed that is not shown. Nothing here knows what draws: [`SceneRenderer`](crate::SceneRenderer) hands the lists to
+//! the [renderer](crate::gpu).
 
 mod error;
+mod input;
 mod kept;
 mod legend;
 mod objects;
@@ -18,15 +20,17 @@ pub use state::{
     IsosurfaceState, MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
 };
 
-use crate::gpu::{BoxLines, Look, MOST_CLIPS, Renderer, SideTarget, TextureView};
+use crate::draw::{BoxLines, Edit, Look, MOST_CLIPS};
 use glam::DVec3;
-use kept::Kept;
-use objects::{Objects, Shown};
+use input::Current;
+use kept::{Kept, KeptMesh};
+use objects::Objects;
 use styles::clips;
 use styles::{quantity, scale};
-use tetralod::geom::{Bounds, Camera, Ray, SinglePoints};
+use tetralod::geom::{Bounds, Camera, Ray};
+use tetralod::mt::MtInfo;
 use tetralod::session::Session;
-use tetralod::view::Probe;
+use tetralod::view::{MeshView, Place, Probe};
 
 /// The outline of the domain, on a dark and on a light background.
 const OUTLINE: [[f32; 4]; 2] = [[0.85, 0.9, 1.0, 0.35], [0.25, 0.28, 0.33, 0.6]];
@@ -35,8 +39,8 @@ const REGION: [f32; 4] = [0.36, 0.86, 1.0, 1.0];
 /// What is shown of a session's mesh.
 #[derive(Debug)]
 pub struct Scene {
-    renderer: Renderer,
     state: SceneState,
+    current: Current,
     objects: Objects,
     kept: Option<Kept>,
     /// The box around the reference mesh, once it is known.
@@ -46,12 +50,23 @@ pub struct Scene {
     is_stale: bool,
 }
 
-impl Scene {
-    /// A scene that `renderer` draws.
-    pub fn new(renderer: Renderer) -> Self {
+/// What [`Scene::update`] has found.
+#[derive(Debug)]
+#[must_use = "the scene takes it as drawn"]
+#[doc(hidden)]
+pub struct Update<'a> {
+    /// What is to be drawn otherwise, in this order.
+    pub edits: Vec<Edit<'a>>,
+    /// Whether a new picture is due. If the state names what the volume does not have, the error says so, and the edits are those
+    /// of what comes before it.
+    pub changed: Result<bool, SceneError>,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
         Self {
-            renderer,
             state: SceneState::default(),
+            current: Current::default(),
             objects: Objects::default(),
             kept: None,
             bounds: None,
@@ -59,11 +74,11 @@ impl Scene {
             is_stale: true,
         }
     }
+}
 
-    /// Draws with another renderer, as when the device of the one before is lost. All is computed and uploaded
-    /// again.
-    pub fn set_renderer(&mut self, renderer: Renderer) {
-        self.renderer = renderer;
+impl Scene {
+    /// What draws has nothing any more, as when its device is lost: the next update computes and lists everything.
+    pub fn start_over(&mut self) {
         self.objects = Objects::default();
         if let Some(kept) = &mut self.kept {
             kept.objects = Objects::default();
@@ -71,26 +86,23 @@ impl Scene {
         self.is_stale = true;
     }
 
+    /// Some of the last edits could not be drawn: surfaces are listed whole the next time that they are.
+    pub fn lose_surfaces(&mut self) {
+        self.objects.lose_surfaces();
+        if let Some(kept) = &mut self.kept {
+            kept.objects.lose_surfaces();
+        }
+    }
+
     /// Keeps a copy of the mesh as it is, with all of its fields, to be compared with later ones: see
-    /// [`SceneState::compare`]. It takes the place of one that was kept before.
+    /// [`SceneState::compare`]. It takes the place of one that was kept before, which is not to be drawn any more.
     ///
     /// # Errors
     /// If nothing has arrived yet.
-    pub fn keep(&mut self, session: &mut Session) -> Result<(), SceneError> {
-        self.renderer.set_split(0.0);
-        self.kept = Some(Kept::of(session)?);
+    pub fn keep(&mut self, session: &mut Session) -> Result<Edit<'static>, SceneError> {
+        self.kept = Some(Kept { mesh: KeptMesh::of(session)?, objects: Objects::default() });
         self.is_stale = true;
-        Ok(())
-    }
-
-    /// The renderer.
-    pub fn renderer(&self) -> &Renderer {
-        &self.renderer
-    }
-
-    /// The renderer, to resize it for example.
-    pub fn renderer_mut(&mut self) -> &mut Renderer {
-        &mut self.renderer
+        Ok(Edit::Beside { split: 0.0, edits: Vec::new() })
     }
 
     /// What is shown.
@@ -114,14 +126,13 @@ impl Scene {
         self.look.pixel_ratio = if ratio.is_finite() { ratio.clamp(0.25, 8.0) } else { 1.0 };
     }
 
-    /// Another session comes: forgets the mesh of the last one. The state stays.
-    pub fn forget(&mut self) -> Result<(), SceneError> {
+    /// Another session comes: forgets the mesh of the last one, and what is drawn of it. The state stays.
+    pub fn forget(&mut self) -> Edit<'static> {
         self.bounds = None;
         self.is_stale = true;
         self.kept = None;
-        self.renderer.set_split(0.0);
-        self.objects.clear(&mut self.renderer)?;
-        Ok(())
+        self.objects = Objects::default();
+        Edit::Clear
     }
 
     /// The box around the reference mesh, which all meshes are in; none until the base mesh is there.
@@ -134,9 +145,9 @@ impl Scene {
         self.objects.legend()
     }
 
-    /// Triangles of all surfaces that are drawn.
-    pub fn triangles(&self) -> usize {
-        self.renderer.triangles()
+    /// The appearance of the picture, as of the last update.
+    pub fn look(&self) -> &Look {
+        &self.look
     }
 
     /// Looks up the box around the session's mesh if that is there for the first time; whether it is. [`Scene::update`] does so, too.
@@ -149,111 +160,51 @@ impl Scene {
         true
     }
 
-    /// Brings what is shown up to date with the session's mesh; whether anything has changed, so that a new picture is due.
-    ///
-    /// # Errors
-    /// If the state names what the volume does not have, or it does not fit on the GPU; what fits is shown.
-    pub fn update(&mut self, session: &mut Session) -> Result<bool, SceneError> {
-        if session.info().is_none() {
-            return Ok(std::mem::take(&mut self.is_stale));
-        }
+    /// Brings what is shown up to date with the session's mesh, and lists what is to be drawn otherwise than before.
+    pub fn update<'a>(&'a mut self, session: &'a mut Session) -> Update<'a> {
+        let mut edits = Vec::new();
+        let changed = self.list(session, &mut edits);
+        Update { edits, changed }
+    }
+
+    fn list<'a>(
+        &'a mut self,
+        session: &'a mut Session,
+        edits: &mut Vec<Edit<'a>>,
+    ) -> Result<bool, SceneError> {
         self.meet(session);
-        let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
         let is_stale = std::mem::take(&mut self.is_stale);
+        let Some(points) = session.info().map(MtInfo::single_points) else { return Ok(is_stale) };
+        let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
+        let Self { state, current, objects, kept, look, .. } = self;
+        let state = &*state;
+        // Before anything is stored.
+        let first = || [Edit::Points(points), Edit::Boxes(boxes(state, &bounds))];
         if is_stale {
-            // Before anything is stored. The values are those of a field, which the objects know.
-            let points = session.info().map_or(SinglePoints::PLAIN, |info| info.single_points());
-            self.renderer.set_points(points);
-            self.look = Look { pixel_ratio: self.look.pixel_ratio, ..look(&self.state, &bounds) };
-            self.renderer.set_boxes(&boxes(&self.state, &bounds))?;
+            edits.extend(first());
+            *look = Look { pixel_ratio: look.pixel_ratio, ..self::look(state, &bounds) };
         }
-        let other =
-            self.kept.as_ref().filter(|_| self.state.compare.is_some_and(|compare| compare.difference));
-        let shown = Shown {
-            state: &self.state,
-            bounds: &bounds,
-            other: other.map(|kept| kept.view(session.field())),
-        };
-        let changed = self.objects.update(&mut self.renderer, session, &shown, is_stale)?;
+        if !current.take(session, state, is_stale)? {
+            return Ok(false);
+        }
+        let session = &*session;
+        let (Some(info), field) = (session.info(), session.field()) else { return Ok(is_stale) };
+        let compare = state.compare.unwrap_or(CompareState { at: 0.0, difference: false });
+        let other = kept.as_ref().filter(|_| compare.difference);
+        current.compare(&session.last_view(), other.map(|kept| kept.mesh.view(field)));
+        objects.list(&current.input(session, info, state, bounds), is_stale, edits)?;
         if is_stale {
-            self.update_kept(session, &bounds)?;
+            let kept = kept.as_mut().filter(|_| compare.at > 0.0);
+            let split = if kept.is_some() { compare.at } else { 0.0 };
+            let mut left = Vec::new();
+            let listed = kept.map_or(Ok(()), |kept| {
+                left.extend(first());
+                kept.list(info, field, state, bounds, &mut left)
+            });
+            edits.push(Edit::Beside { split, edits: left });
+            listed?;
         }
-        Ok(changed || is_stale)
-    }
-
-    /// Shows the mesh that was kept beside the current one, if it is to be shown.
-    fn update_kept(&mut self, session: &Session, bounds: &Bounds) -> Result<(), SceneError> {
-        let at = self.state.compare.map_or(0.0, |compare| compare.at);
-        let (Some(kept), Some(info), true) = (&mut self.kept, session.info(), at > 0.0) else {
-            self.renderer.set_split(0.0);
-            return Ok(());
-        };
-        self.renderer.set_split(at);
-        let other = self.renderer.beside()?;
-        other.set_points(info.single_points());
-        other.set_boxes(&boxes(&self.state, bounds))?;
-        kept.update(other, info, session.field(), &self.state, bounds)
-    }
-
-    /// Draws a picture; `false` when the target is not available, such as a hidden canvas.
-    ///
-    /// # Errors
-    /// If the device is lost or refused something.
-    pub fn draw(&mut self, session: &mut Session, camera: &Camera) -> Result<bool, SceneError> {
-        self.place_eye(session, camera);
-        Ok(self.renderer.draw(camera, &self.look)?)
-    }
-
-    /// Draws a picture into a view of a texture, as [`Renderer::render`] does.
-    ///
-    /// # Errors
-    /// As [`Scene::draw`].
-    pub fn render(
-        &mut self,
-        view: &TextureView,
-        session: &mut Session,
-        camera: &Camera,
-    ) -> Result<(), SceneError> {
-        self.place_eye(session, camera);
-        Ok(self.renderer.render(view, camera, &self.look)?)
-    }
-
-    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture_with`] does.
-    ///
-    /// # Errors
-    /// If the target is no image, or the device is lost or refused something.
-    pub async fn picture(
-        &mut self,
-        session: &mut Session,
-        camera: &Camera,
-        samples: u32,
-        drawn: impl FnMut(u32),
-    ) -> Result<Vec<u8>, SceneError> {
-        self.place_eye(session, camera);
-        Ok(self.renderer.picture_with(camera, &self.look, samples, drawn).await?)
-    }
-
-    /// Draws a picture on another target, as the mean of `samples`, with lines as wide in its parts as they are on the own one.
-    ///
-    /// # Errors
-    /// As [`Scene::draw`].
-    pub fn draw_on(
-        &mut self,
-        target: &mut SideTarget,
-        session: &mut Session,
-        camera: &Camera,
-        samples: u32,
-    ) -> Result<(), SceneError> {
-        self.place_eye(session, camera);
-        Ok(self.renderer.draw_on_side(target, camera, &self.look, samples)?)
-    }
-
-    /// Draws the last picture again, for a smoother mean of several: see [`Renderer::draw_again`].
-    ///
-    /// # Errors
-    /// As [`Scene::draw`].
-    pub fn draw_again(&mut self) -> Result<bool, SceneError> {
-        Ok(self.renderer.draw_again()?)
+        Ok(true)
     }
 
     /// The nearest point that is shown along a ray: of an isosurface, a slice, the boundary, a tetrahedron, a streamline, an
@@ -262,14 +213,17 @@ impl Scene {
         self.objects.pick(session, &self.state, &self.look.clips, ray, self.bounds.as_ref()?)
     }
 
-    /// Tells the renderer in which tetrahedron the eye is.
-    fn place_eye(&mut self, session: &mut Session, camera: &Camera) {
-        let (Some(_), Some(bounds)) = (&self.state.volume, &self.bounds) else { return };
+    /// Where in the session's mesh the eye is, if a volume is shown: that mesh, and the place unless it is outside.
+    pub fn eye<'a>(
+        &self,
+        session: &'a mut Session,
+        camera: &Camera,
+    ) -> Option<(MeshView<'a>, Option<Place>)> {
+        let (Some(_), Some(bounds)) = (&self.state.volume, &self.bounds) else { return None };
         let eye = camera.rays(1.0).origin[0];
         let mesh = session.view();
         let is_near = eye.cmpge(DVec3::from(bounds.min)).all() && eye.cmple(DVec3::from(bounds.max)).all();
-        let place = is_near.then(|| Probe::new(mesh).locate(eye.into())).flatten();
-        self.renderer.set_eye(&mesh, place.as_ref());
+        Some((mesh, is_near.then(|| Probe::new(mesh).locate(eye.into())).flatten()))
     }
 }
 

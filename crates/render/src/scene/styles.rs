@@ -1,10 +1,10 @@
-//! What a scene's state says of colours, shapes and media, as the renderer takes it.
+//! What a scene's state says of colours, shapes and media, as it is to be drawn.
 
 use super::SceneError;
 use super::state::{
     CellKind, CellState, ColourState, IsosurfaceState, PlaneState, SceneState, VolumeState, bounds,
 };
-use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Style};
+use crate::draw::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Style};
 use tetralod::session::TetQuantity;
 use tetralod::view::{ClipPlane, ColourScale, Medium};
 

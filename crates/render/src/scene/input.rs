@@ -1,0 +1,151 @@
+//! What the objects of a scene are computed from: a session's mesh as it is now, or one that was kept.
+
+use super::state::ColourState;
+use super::styles::{quantity, scale};
+use super::{SceneError, SceneState};
+use std::borrow::Cow;
+use tetralod::geom::{Bounds, SingleValues};
+use tetralod::mt::{MeshChanges, MtInfo};
+use tetralod::session::Session;
+use tetralod::view::{ColourScale, Difference, MeshView};
+
+/// What was computed last of a session's mesh before any object.
+#[derive(Debug, Default)]
+pub(super) struct Current {
+    changes: MeshChanges,
+    /// A number for each tetrahedron, if they are coloured by one.
+    tet_values: Vec<f64>,
+    /// The field of the mesh without that of the one that was kept, if that is shown.
+    difference: Option<Difference>,
+}
+
+impl Current {
+    /// Brings it up to date but for the difference; whether there is anything new.
+    pub fn take(
+        &mut self,
+        session: &mut Session,
+        state: &SceneState,
+        is_stale: bool,
+    ) -> Result<bool, SceneError> {
+        self.changes = session.take_changes();
+        let is_new = is_stale || !self.changes.vertices.is_empty() || !self.changes.tets.is_empty();
+        if let (true, Some(quantity)) = (is_new, state.cells.as_ref().map_or(Ok(None), quantity)?) {
+            session.tet_quantity_into(quantity, &mut self.tet_values)?;
+        }
+        Ok(is_new)
+    }
+
+    /// Takes the field of `other` from that of the mesh.
+    pub fn compare(&mut self, mesh: &MeshView<'_>, other: Option<MeshView<'_>>) {
+        let had_one = self.difference.take().is_some();
+        self.difference = other.and_then(|other| Difference::of(mesh, other));
+        if had_one || self.difference.is_some() {
+            // Each point has another value.
+            self.changes.vertices = MeshChanges::of_all_vertices(mesh.positions.len()).vertices;
+        }
+    }
+
+    pub fn input<'a>(
+        &'a self,
+        session: &'a Session,
+        info: &'a MtInfo,
+        state: &'a SceneState,
+        bounds: Bounds,
+    ) -> Input<'a> {
+        let mesh = session.last_view();
+        let difference = self.difference.as_ref();
+        let coloured = difference.map_or(mesh.field, |difference| &difference.values);
+        Input {
+            mesh: MeshView { field: coloured, ..mesh },
+            field: mesh.field,
+            largest_difference: difference.map(|difference| difference.largest),
+            fields: Box::new(move |field| session.values(field).into()),
+            tet_values: &self.tet_values,
+            info,
+            shown: session.field(),
+            state,
+            bounds,
+            changes: &self.changes,
+        }
+    }
+}
+
+/// What the objects are computed from.
+pub(super) struct Input<'a> {
+    /// The mesh whose field colours things: a field of its own, or the difference to another mesh.
+    pub mesh: MeshView<'a>,
+    /// The field of the mesh, which isosurfaces follow.
+    pub field: &'a [f64],
+    /// The largest absolute value of the difference, if that is shown.
+    pub largest_difference: Option<f64>,
+    /// The values of a field, by its number.
+    pub fields: Box<dyn Fn(usize) -> Cow<'a, [f64]> + 'a>,
+    /// A number for each tetrahedron, if they are coloured by one.
+    pub tet_values: &'a [f64],
+    pub info: &'a MtInfo,
+    /// The number of the field.
+    pub shown: usize,
+    pub state: &'a SceneState,
+    pub bounds: Bounds,
+    pub changes: &'a MeshChanges,
+}
+
+impl<'a> Input<'a> {
+    /// The number of the field with a name, of the time step that is shown if it has that; that of the mesh without one.
+    pub fn field(&self, what: &str, name: Option<&String>) -> Result<usize, SceneError> {
+        let Some(name) = name else { return Ok(self.shown) };
+        let time = self.info.fields[self.shown].time;
+        let all = || self.info.fields.iter().enumerate().filter(|(_, field)| field.name == *name);
+        let found = all().find(|(_, field)| field.time == time).or_else(|| all().next());
+        found.map(|(number, _)| number).ok_or_else(|| {
+            let names = self.info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>();
+            let problem = format!("there is no field {name:?}; this volume has: {}", names.join(", "));
+            SceneError::state(what, problem)
+        })
+    }
+
+    /// The colours of a field; the range of the state is for the field that is shown.
+    pub fn scale(&self, field: usize) -> Result<ColourScale, SceneError> {
+        if let Some(largest) = self.largest_difference.filter(|_| field == self.shown) {
+            let most = if largest > 0.0 { largest } else { 1.0 };
+            return scale(&ColourState { log: false, ..self.state.colours.clone() }, None, [-most, most]);
+        }
+        let own = self.info.range_at_all_times(field);
+        scale(&self.state.colours, if field == self.shown { self.state.colours.range } else { None }, own)
+    }
+
+    /// How the values of a field, or the difference, are stored in single precision.
+    pub fn single(&self, field: usize) -> SingleValues {
+        match self.largest_difference.filter(|_| field == self.shown) {
+            Some(largest) => SingleValues::of([-largest, largest], 0.0),
+            None => self.info.fields[field].single_values(),
+        }
+    }
+
+    /// From 0 to the largest length that the components of a vector allow at any time: whatever is drawn of it has the same colours.
+    pub fn lengths(&self, names: &[String; 3]) -> [f64; 2] {
+        let largest = |name: &String| {
+            let steps = self.info.fields.iter().filter(|step| step.name == *name);
+            steps.fold(0.0_f64, |most, step| most.max(step.min.abs()).max(step.max.abs()))
+        };
+        [0.0, names.iter().map(largest).fold(0.0, f64::hypot)]
+    }
+
+    /// What colours by a field: its values, or the difference.
+    pub fn values(&self, field: usize) -> Cow<'a, [f64]> {
+        let is_difference = field == self.shown && self.largest_difference.is_some();
+        if is_difference { self.mesh.field.into() } else { (self.fields)(field) }
+    }
+
+    pub fn vectors(&self, what: &str, names: &[String; 3]) -> Result<[Cow<'a, [f64]>; 3], SceneError> {
+        let mut found = [0; 3];
+        for (place, name) in found.iter_mut().zip(names) {
+            *place = self.field(what, Some(name))?;
+        }
+        Ok(found.map(|field| (self.fields)(field)))
+    }
+
+    pub fn diagonal(&self) -> f64 {
+        self.bounds.diagonal()
+    }
+}

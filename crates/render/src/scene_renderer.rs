@@ -1,0 +1,201 @@
+//! A scene and what draws it.
+
+use crate::gpu::{GpuError, Renderer, SideTarget, TextureView};
+use crate::scene::{Legend, Scene, SceneError, SceneState, Update};
+use tetralod::Coded;
+use tetralod::geom::{Bounds, Camera, Ray};
+use tetralod::session::Session;
+use thiserror::Error;
+
+/// Shows a session's mesh: a [`Scene`] says what is to be drawn of it, a [`Renderer`] draws that.
+#[derive(Debug)]
+pub struct SceneRenderer {
+    scene: Scene,
+    renderer: Renderer,
+}
+
+/// Why something is not shown, or not all of it.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum ShowError {
+    /// It cannot be listed.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The GPU cannot draw it.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+impl Coded for ShowError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Scene(error) => error.code(),
+            Self::Gpu(error) => error.code(),
+        }
+    }
+}
+
+impl SceneRenderer {
+    /// An empty scene that `renderer` draws.
+    pub fn new(renderer: Renderer) -> Self {
+        Self { scene: Scene::default(), renderer }
+    }
+
+    /// Draws with another renderer, as when the device of the one before is lost. All is computed and uploaded
+    /// again.
+    pub fn set_renderer(&mut self, renderer: Renderer) {
+        self.renderer = renderer;
+        self.scene.start_over();
+    }
+
+    /// The renderer.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// The renderer, to resize it for example.
+    pub fn renderer_mut(&mut self) -> &mut Renderer {
+        &mut self.renderer
+    }
+
+    /// As [`Scene::keep`].
+    ///
+    /// # Errors
+    /// If nothing has arrived yet.
+    pub fn keep(&mut self, session: &mut Session) -> Result<(), ShowError> {
+        let edit = self.scene.keep(session)?;
+        Ok(self.renderer.apply(&[edit])?)
+    }
+
+    /// As [`Scene::forget`].
+    ///
+    /// # Errors
+    /// If the device refuses it.
+    pub fn forget(&mut self) -> Result<(), GpuError> {
+        self.renderer.apply(&[self.scene.forget()])
+    }
+
+    /// What is shown.
+    pub fn state(&self) -> &SceneState {
+        self.scene.state()
+    }
+
+    /// As [`Scene::set_state`].
+    ///
+    /// # Errors
+    /// If a part of it makes no sense whatever the volume is; then nothing changes.
+    pub fn set_state(&mut self, state: SceneState) -> Result<(), SceneError> {
+        self.scene.set_state(state)
+    }
+
+    /// As [`Scene::set_pixel_ratio`].
+    pub fn set_pixel_ratio(&mut self, ratio: f32) {
+        self.scene.set_pixel_ratio(ratio);
+    }
+
+    /// As [`Scene::bounds`].
+    pub fn bounds(&self) -> Option<&Bounds> {
+        self.scene.bounds()
+    }
+
+    /// As [`Scene::legend`].
+    pub fn legend(&self) -> Option<&Legend> {
+        self.scene.legend()
+    }
+
+    /// As [`Scene::meet`].
+    pub fn meet(&mut self, session: &mut Session) -> bool {
+        self.scene.meet(session)
+    }
+
+    /// As [`Scene::pick`].
+    pub fn pick(&self, session: &mut Session, ray: &Ray) -> Option<[f64; 3]> {
+        self.scene.pick(session, ray)
+    }
+
+    /// Triangles of all surfaces that are drawn.
+    pub fn triangles(&self) -> usize {
+        self.renderer.triangles()
+    }
+
+    /// Brings what is shown up to date with the session's mesh; whether anything has changed, so that a new picture is due.
+    ///
+    /// # Errors
+    /// If the state names what the volume does not have, or it does not fit on the GPU; what fits is shown.
+    pub fn update(&mut self, session: &mut Session) -> Result<bool, ShowError> {
+        let Update { edits, changed } = self.scene.update(session);
+        if let Err(error) = self.renderer.apply(&edits) {
+            self.scene.lose_surfaces();
+            return Err(error.into());
+        }
+        Ok(changed?)
+    }
+
+    /// Draws a picture; `false` when the target is not available, such as a hidden canvas.
+    ///
+    /// # Errors
+    /// If the device is lost or refused something.
+    pub fn draw(&mut self, session: &mut Session, camera: &Camera) -> Result<bool, GpuError> {
+        self.place_eye(session, camera);
+        self.renderer.draw(camera, self.scene.look())
+    }
+
+    /// Draws a picture into a view of a texture, as [`Renderer::render`] does.
+    ///
+    /// # Errors
+    /// As [`SceneRenderer::draw`].
+    pub fn render(
+        &mut self,
+        view: &TextureView,
+        session: &mut Session,
+        camera: &Camera,
+    ) -> Result<(), GpuError> {
+        self.place_eye(session, camera);
+        self.renderer.render(view, camera, self.scene.look())
+    }
+
+    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture_with`] does.
+    ///
+    /// # Errors
+    /// If the target is no image, or the device is lost or refused something.
+    pub async fn picture(
+        &mut self,
+        session: &mut Session,
+        camera: &Camera,
+        samples: u32,
+        drawn: impl FnMut(u32),
+    ) -> Result<Vec<u8>, GpuError> {
+        self.place_eye(session, camera);
+        self.renderer.picture_with(camera, self.scene.look(), samples, drawn).await
+    }
+
+    /// Draws a picture on another target, as the mean of `samples`, with lines as wide in its parts as they are on the own one.
+    ///
+    /// # Errors
+    /// As [`SceneRenderer::draw`].
+    pub fn draw_on(
+        &mut self,
+        target: &mut SideTarget,
+        session: &mut Session,
+        camera: &Camera,
+        samples: u32,
+    ) -> Result<(), GpuError> {
+        self.place_eye(session, camera);
+        self.renderer.draw_on_side(target, camera, self.scene.look(), samples)
+    }
+
+    /// Draws the last picture again, for a smoother mean of several: see [`Renderer::draw_again`].
+    ///
+    /// # Errors
+    /// As [`SceneRenderer::draw`].
+    pub fn draw_again(&mut self) -> Result<bool, GpuError> {
+        self.renderer.draw_again()
+    }
+
+    /// Tells the renderer in which tetrahedron the eye is.
+    fn place_eye(&mut self, session: &mut Session, camera: &Camera) {
+        if let Some((mesh, place)) = self.scene.eye(session, camera) {
+            self.renderer.set_eye(&mesh, place.as_ref());
+        }
+    }
+}
