@@ -406,8 +406,8 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
         rows.push(("field", field_row(steps)));
         // Time steps are alike.
         rows.extend(steps[0].histogram.as_deref().map(|shares| ("  values", histogram_row(shares))));
-        // Files that are read from front to back state their length alone.
-        if steps[0].curve.len() > 1 {
+        // Files without an index state their length alone.
+        if report.blocks.is_some() {
             rows.push(("  bytes at error", curve_row(&steps[0].curve)));
         }
     }

@@ -47,7 +47,7 @@ pub enum FormatError {
     /// The stream ended before the file did; what has arrived is usable.
     #[error("{} {AGAIN}", truncated(*.offset))]
     Truncated {
-        /// Bytes that arrived.
+        /// Bytes that arrived; where a range of the file was asked for that is beyond its end, the beginning of that.
         offset: u64,
     },
     /// The file needs more than [`Limits`](super::Limits) allow.

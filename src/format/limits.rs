@@ -1,5 +1,7 @@
 //! How much a decoder may take.
 
+use super::FormatError;
+
 /// Caps on what a decoder keeps in memory, whatever a file claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -15,4 +17,12 @@ impl Default for Limits {
         let memory_bytes = if cfg!(target_pointer_width = "32") { 2 << 30 } else { 16 << 30 };
         Self { section_bytes: 256 << 20, memory_bytes }
     }
+}
+
+/// Whether an MT that takes so many bytes fits the limits.
+pub fn check_bytes(needed: u64, limits: &Limits) -> Result<(), FormatError> {
+    if needed > limits.memory_bytes {
+        return Err(FormatError::Limit { what: "the MT in memory", needed, limit: limits.memory_bytes });
+    }
+    Ok(())
 }

@@ -10,6 +10,8 @@ mod checksum;
 mod coder;
 mod decode;
 mod encode;
+mod encode_error;
+mod encode_options;
 mod error;
 mod header;
 mod limits;
@@ -23,7 +25,9 @@ pub use decode::DecodeOptions;
 pub use decode::{Decoder, ErrorBytes, ExactStatus, Progress};
 #[doc(hidden)]
 pub use encode::breakdown;
-pub use encode::{EncodeError, EncodeOptions, encode, encode_to};
+pub use encode::{encode, encode_to};
+pub use encode_error::EncodeError;
+pub use encode_options::EncodeOptions;
 pub use error::FormatError;
 pub use limits::Limits;
 #[doc(hidden)]

@@ -22,7 +22,7 @@ impl MtKind {
     /// The kinds that files have: all but [`MtKind::Explicit`].
     pub const OF_FILES: [Self; 3] = [Self::HalfEdge, Self::Edge, Self::Vertex];
 
-    /// Whether MTs of this kind can come in pages of updates: see [`Mt::is_paged`].
+    /// Whether MTs of this kind can come in pages of updates: see `Mt::is_paged`.
     pub fn is_paged(self) -> bool {
         self == Self::HalfEdge
     }

@@ -1,7 +1,7 @@
 //! Promise: the surface of a session that goes from request to request is that of its mesh, whatever was before, for
 //! MTs of every kind.
 
-use crate::support::conformance::{DELAUNAY, EDGE, HALF_EDGE, INSERTED, SPELLED_EDGE, SPELLED_VERTEX};
+use crate::support::conformance::{DELAUNAY, EDGE, HALF_EDGE, INSERTED};
 use crate::support::meshes::{bent, cube, hilly, linear};
 use crate::support::random::Random;
 use std::collections::BTreeMap;
@@ -76,7 +76,7 @@ fn assert_closed(surface: &IsoSurface, inside: impl Fn([f64; 3]) -> bool) {
 #[test]
 fn the_surface_follows_every_kind_of_mt_from_request_to_request() {
     let in_cube = |p: [f64; 3]| p.iter().all(|x| 0.001 < *x && *x < 0.999);
-    for how in [EDGE, SPELLED_EDGE, HALF_EDGE, DELAUNAY, INSERTED, SPELLED_VERTEX] {
+    for how in [EDGE, HALF_EDGE, DELAUNAY, INSERTED] {
         for (is_cube, mesh) in [(true, cube(7, &[hilly, linear])), (false, bent(6))] {
             if how == INSERTED && !is_cube {
                 continue;

@@ -4,6 +4,7 @@
 use crate::support::meshes::{built, cube, hilly, linear};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::LazyLock;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mt::Mt;
 use tetralod::refine::Request;
@@ -97,10 +98,15 @@ impl Drawn {
     }
 }
 
-fn opened() -> Session {
+/// An MT of two fields.
+static FILE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mt = Mt::from(built(&cube(6, &[hilly, linear])).mt);
+    encode(&mt, &EncodeOptions::default()).expect("a complete MT")
+});
+
+fn opened() -> Session {
     let mut session = Session::new();
-    session.feed(&encode(&mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
+    session.feed(&FILE).expect("a good file");
     session
 }
 
@@ -162,8 +168,8 @@ fn states() -> [SceneState; 3] {
 fn lists_one_after_the_other_make_what_one_from_nothing_makes() {
     let (mut session, mut drawn, mut scene) = (opened(), Drawn::default(), Scene::default());
     for state in states().iter().chain(states().iter().rev()) {
+        scene.set_state(state.clone()).expect("a good state");
         for error in [0.3, 0.0, 0.1] {
-            scene.set_state(state.clone()).expect("a good state");
             session.refine(&Request::within(error)).expect("a good request");
             assert!(follow(&mut scene, &mut session, &mut drawn));
             drawn.assert_same(&anew(state, error));

@@ -525,7 +525,7 @@ fn kinds_methods_and_criteria_that_do_not_go_together_are_refused() {
         (&["--kind", "vertex", "--method", "insert", "--criterion", "half-edge"], &["delaunay", "decimate"]),
         (&["--method", "collapse", "--criterion", "delaunay"], &["--method insert or decimate"]),
         (&["--kind", "edge", "--criterion", "half-edge"], &["--method insert or decimate"]),
-        (&["--kind", "vertex"], &["explicit", "half-edge, edge, vertex"]),
+        (&["--kind", "explicit"], &["explicit", "half-edge, edge, vertex"]),
         (&["--kind", "face"], &["face", "half-edge, edge, vertex"]),
         (&["--method", "guess"], &["guess", "collapse, insert, decimate"]),
         (&["--criterion", "none"], &["none", "delaunay, half-edge"]),

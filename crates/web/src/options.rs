@@ -17,7 +17,7 @@ const TYPES: &str = r#"import type { RefineOptions } from "./options.js";"#;
 
 #[wasm_bindgen]
 extern "C" {
-    /// [`RefineOptions`](TYPES) as JavaScript gives it: anything at all.
+    /// `RefineOptions` as JavaScript gives it: anything at all.
     #[wasm_bindgen(typescript_type = "RefineOptions")]
     pub type RefineOptions;
 }

@@ -2,6 +2,8 @@
 
 mod blocks;
 mod curve;
+mod file_head;
+mod open_block;
 mod sections;
 
 use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, may_be_mt, parse_header};
@@ -13,7 +15,8 @@ use super::{FormatError, Index, Limits, checksum};
 use crate::geom::{Bounds, lattice_box};
 use crate::mt::{Mt, MtInfo, MultiTessellation, UpdatePages};
 pub use curve::ErrorBytes;
-use sections::{FileHead, OpenBlock};
+use file_head::FileHead;
+use open_block::OpenBlock;
 
 /// Most bytes that are kept allocated between sections.
 const KEPT_BYTES: usize = 1 << 20;

@@ -6,8 +6,7 @@ use crate::format::header::Kind;
 use crate::format::section::Section;
 use crate::format::{EncodeError, FormatError, Limits};
 use crate::mt::{
-    ApplyUpdates, BaseMesh, BaseMeshError, EdgeMt, ErrorCode, HalfEdgeMt, Mt, MtFacts, MtInfo, MtKind,
-    UpdateError, UpdateId, VertexMt,
+    ApplyUpdates, BaseMesh, BaseMeshError, ErrorCode, Mt, MtFacts, MtInfo, MtKind, UpdateError, UpdateId,
 };
 use std::fmt::Debug;
 use std::ops::Range;
@@ -140,48 +139,4 @@ pub fn sections_in_order<C: Codec>(
         sections.push(vec![section?]);
     }
     Ok(sections)
-}
-
-/// The codec of a kind as far as whoever reads a file needs it.
-pub struct KindCodec {
-    pub kind: MtKind,
-    pub number: u8,
-    pub section: Kind,
-    parts: Parts,
-    pub has_tet_errors: bool,
-    pub check_counts: fn(&MtInfo, u64) -> Result<(), BaseMeshError>,
-    pub least_update_bytes: fn(&MtInfo) -> u64,
-    pub read_head: ReadHead,
-}
-
-/// See [`Codec::read_head`].
-type ReadHead = fn(&mut Source<'_>, &MtInfo, [u32; 2], u32, &Limits) -> Result<Box<dyn Head>, FormatError>;
-
-impl KindCodec {
-    const fn of<C: Codec>() -> Self {
-        Self {
-            kind: C::KIND,
-            number: C::NUMBER,
-            section: C::SECTION,
-            parts: C::PARTS,
-            has_tet_errors: C::HAS_TET_ERRORS,
-            check_counts: C::check_counts,
-            least_update_bytes: C::least_update_bytes,
-            read_head: C::read_head,
-        }
-    }
-
-    /// The families of the kind, in the order of their contexts, with names for what they code.
-    pub fn parts(&self) -> Vec<(&'static str, Family)> {
-        super::parts(self.parts)
-    }
-}
-
-/// Of all kinds that files have.
-pub static CODECS: [KindCodec; 3] =
-    [KindCodec::of::<EdgeMt>(), KindCodec::of::<VertexMt>(), KindCodec::of::<HalfEdgeMt>()];
-
-/// The codec of a kind; none of one that no file has.
-pub fn codec_of(kind: MtKind) -> Option<&'static KindCodec> {
-    CODECS.iter().find(|codec| codec.kind == kind)
 }

@@ -4,11 +4,12 @@
 //! are coded as a forest: a split is listed with the split in the same block that created its
 //! vertex, or else among the roots.
 
+use super::base;
 use super::changes::{FieldPart, put_changes, range_of, read_changes};
 use super::codec::{Codec, Head, InOrder, Parts, Started, put_in_order, sections_in_order};
-use super::{base, check_bytes};
 use crate::format::coder::{Family, Models, Put, Source};
 use crate::format::header::Kind;
+use crate::format::limits::check_bytes;
 use crate::format::section::Section;
 use crate::format::{EncodeError, FormatError, Limits};
 use crate::mt::{

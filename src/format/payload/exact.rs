@@ -1,14 +1,9 @@
 //! `fldx`: the exact values of a field at the vertices of the reference mesh, as what is wrong with their levels.
 
-use super::BASE_LEVEL;
+use super::families::{EXACT_GAP, EXACT_LENGTH};
 use crate::format::FormatError;
-use crate::format::coder::{Family, Put, Source};
+use crate::format::coder::{Put, Source};
 use crate::mt::{Exact, ExactValues, VertexId};
-
-/// Distances between the numbers of vertices that have values.
-pub const GAP: Family = BASE_LEVEL.numbers_after(1, 1);
-/// Bits of what is wrong with a level: how many, then the bits below the first.
-pub const LENGTH: Family = GAP.after(2, 65);
 
 /// The exact values of one field, to be had from the levels.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,12 +55,12 @@ impl Corrections {
     pub(crate) fn put(&self, out: &mut impl Put) {
         let mut next = 0;
         for (&vertex, &step) in self.vertices.iter().zip(&self.steps) {
-            out.number(GAP, 0, vertex - next);
+            out.number(EXACT_GAP, 0, vertex - next);
             next = vertex + 1;
             // The sign last.
             let zigzag = (step << 1 ^ step >> 63) as u64;
             let length = u64::BITS - zigzag.leading_zeros();
-            out.symbol(LENGTH, u32::from(!self.is_single), length);
+            out.symbol(EXACT_LENGTH, u32::from(!self.is_single), length);
             let low = length.saturating_sub(1);
             out.bits(zigzag as u32, low.min(32));
             out.bits((zigzag >> 32) as u32, low.saturating_sub(32));
@@ -76,10 +71,10 @@ impl Corrections {
         let mut corrections = Self { is_single, vertices: Vec::new(), steps: Vec::new() };
         let mut next = 0_u32;
         for _ in 0..count {
-            let vertex = next.checked_add(source.number(GAP, 0)?).filter(|&v| v < u32::MAX);
+            let vertex = next.checked_add(source.number(EXACT_GAP, 0)?).filter(|&v| v < u32::MAX);
             let vertex = vertex.ok_or_else(|| source.corrupt("a vertex has too large a number"))?;
             next = vertex + 1;
-            let length = source.symbol(LENGTH, u32::from(!is_single))?;
+            let length = source.symbol(EXACT_LENGTH, u32::from(!is_single))?;
             let low = length.saturating_sub(1);
             let bits =
                 u64::from(source.bits(low.min(32))?) | u64::from(source.bits(low.saturating_sub(32))?) << 32;

@@ -4,11 +4,12 @@
 //! updates whose near vertex is its own. What removes the tetrahedra of its star is coded as residuals: see
 //! `mt/half_edge/star_code.rs`.
 
+use super::base;
 use super::changes::{FieldPart, put_changes, range_of, read_changes};
 use super::codec::{Codec, Head, Parts, Started};
-use super::{base, check_bytes};
 use crate::format::coder::{Counts, Family, Models, Put, Source, Writer};
 use crate::format::header::Kind;
+use crate::format::limits::check_bytes;
 use crate::format::section::Section;
 use crate::format::{EncodeError, FormatError, Limits};
 use crate::mesh::NONE;

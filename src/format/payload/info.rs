@@ -1,6 +1,6 @@
 //! `INFO`: the description of an MT.
 
-use super::codec::{CODECS, codec_of};
+use super::kind_codec::{CODECS, codec_of};
 use crate::format::read::{MAX_STRING, Reader};
 use crate::format::{EncodeError, FormatError, write};
 use crate::geom::Lattice;

@@ -7,42 +7,25 @@ mod changes;
 pub mod codec;
 pub mod edge;
 pub mod exact;
+mod families;
 pub mod half_edge;
 pub mod histogram;
 pub mod index;
 mod info;
+pub mod kind_codec;
 mod vertex;
 
-use super::coder::{Family, Models, Put, Source};
+use super::coder::{Models, Put, Source};
+use super::limits::check_bytes;
 use super::read::Reader;
 use super::{FormatError, Limits, write};
-use crate::mt::{BaseMesh, MAX_QUARTERINGS, MtInfo};
+use crate::mt::{BaseMesh, MtInfo};
 pub use changes::FieldPart;
-use codec::{Codec, Head, KindCodec, Parts, Started};
+use codec::{Codec, Head, Started};
+use families::BASE_LEVEL;
+pub use families::parts;
 pub use info::{Metadata, read_info, write_info};
-
-/// The families of a kind with those of all kinds, in the order of their contexts.
-pub fn parts(own: Parts) -> Vec<(&'static str, Family)> {
-    let base = base::FAMILIES.into_iter().map(|family| ("base mesh", family));
-    let last = [
-        ("base mesh", BASE_LEVEL),
-        ("exact values", exact::GAP),
-        ("exact values", exact::LENGTH),
-        ("errors of tetrahedra", QUARTERINGS),
-        ("errors of tetrahedra", OWN_FALL),
-    ];
-    base.chain(own.iter().copied()).chain(last).collect()
-}
-
-/// Differences between the levels of base vertices.
-const BASE_LEVEL: Family = edge::LEVEL.numbers_after(1, 2);
-
-/// By how many 32nds of a factor of 2 the errors of an update are larger than those of what it removes.
-const OWN_FALL: Family = QUARTERINGS.after(1, 256);
-
-/// How often what is left of the errors of an update can be quartered to bound those of a tetrahedron that it removes; by that of the one
-/// before it in the update, and whether the new vertex lies in it.
-const QUARTERINGS: Family = exact::LENGTH.after(8, MAX_QUARTERINGS as u32 + 1);
+use kind_codec::KindCodec;
 
 /// Puts what is coded of the base mesh.
 pub fn put_base(out: &mut impl Put, mt: &impl Codec) {
@@ -157,13 +140,6 @@ pub fn check_memory(
     let fields = info.fields.len() as u64;
     let base = vertices * (16 + 4 * fields) + tets * 16;
     check_bytes(base + u64::from(updates) * (codec.least_update_bytes)(info), limits)
-}
-
-fn check_bytes(needed: u64, limits: &Limits) -> Result<(), FormatError> {
-    if needed > limits.memory_bytes {
-        return Err(FormatError::Limit { what: "the MT in memory", needed, limit: limits.memory_bytes });
-    }
-    Ok(())
 }
 
 /// The totals at the end of a file.

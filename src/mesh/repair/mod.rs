@@ -93,7 +93,7 @@ impl fmt::Display for RepairReport {
     }
 }
 
-/// Mends `mesh` at the level [`RepairLevel::Safe`]; the result passes [`crate::mesh::check`].
+/// Mends `mesh` at the level [`RepairLevel::Safe`]; the result passes `crate::mesh::check`.
 ///
 /// # Errors
 /// If something cannot be mended; cells and points are numbered as in `mesh`.
@@ -101,7 +101,7 @@ pub fn repair(mesh: TetMesh) -> Result<(TetMesh, RepairReport), MeshError> {
     repair_at(mesh, RepairLevel::Safe)
 }
 
-/// Mends `mesh` by the rules of this level; the result passes [`crate::mesh::check`]. [`findings`] says what is unusual
+/// Mends `mesh` by the rules of this level; the result passes `crate::mesh::check`. [`findings`] says what is unusual
 /// about it.
 ///
 /// ```

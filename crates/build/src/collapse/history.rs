@@ -4,7 +4,7 @@ use crate::change::collapse_check::CheckedCollapse;
 use crate::change::work_mesh::WorkMesh;
 use crate::error::cost::VertexData;
 use crate::order::base::{Numbered, number_base};
-use crate::order::order::Updates;
+use crate::order::update_order::Updates;
 use crate::{BuildError, BuildProgress, OnProgress};
 use std::cmp::Reverse;
 use tetralod::mesh::NONE;

@@ -5,5 +5,5 @@
 
 pub(crate) mod base;
 pub(crate) mod block_order;
-pub(crate) mod order;
 pub(crate) mod reach;
+pub(crate) mod update_order;

@@ -2,7 +2,7 @@
 //!
 //! The domain is parted in space ([`part`]). Each part is built on its own ([`build_part`]): vertices that it shares with others stay,
 //! so what is left of it still fits them. Eight parts at a time are joined ([`join`]): what was between them is simplified then, and
-//! what is left joins the next seven, as in an octree. In the end one MT is made of all updates ([`assemble`]), which does not know
+//! what is left joins the next seven, as in an octree. In the end one MT is made of all updates (`assemble`), which does not know
 //! of the parts. (Danovaro, De Floriani, Magillo, Puppo 2003 name this as future work [§7].)
 //!
 //! Each step reads and writes plain bytes, its result depends on nothing else, and takes memory for what is left of a part. The error

@@ -111,7 +111,7 @@ fn a_file_whose_exact_values_are_cut_off_says_so() {
     let mut mesh = cube(6, &[hilly, |[x, y, z]| x * y / (1.5 + z)]);
     mesh.fields[0].values[3] = 1.0 / 3.0;
     let config =
-        BuildConfig { all_fields: true, all_lossless: true, block_bits: 4, ..BuildConfig::of(MtKind::Edge) };
+        BuildConfig { all_fields: true, all_lossless: true, block_bits: 4, ..BuildConfig::default() };
     let built = build(&mesh, &config).expect("a mesh to build on");
     let options = EncodeOptions { exact: built.exact, ..EncodeOptions::default() };
     let bytes = encode(&built.mt, &options).expect("a sound MT");

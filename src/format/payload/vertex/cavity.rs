@@ -1,18 +1,9 @@
 //! What an insertion removes, found face by face from its first tetrahedron on.
 
-use super::state::State;
+use super::state::{State, View};
 use crate::geom::{insphere, views_of_origin};
 use crate::mesh::{FACES, NONE};
 use crate::mt::MAX_REMOVED;
-
-/// How a point and a tetrahedron lie to each other.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct View {
-    /// Bit `k` is set if the point is on the inner side of face `k`.
-    seen: u8,
-    /// Where the point is with respect to the sphere: 1 inside, -1 outside, 0 on it.
-    sphere: i32,
-}
 
 /// One bit for each.
 #[inline]

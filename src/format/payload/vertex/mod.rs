@@ -5,55 +5,26 @@
 //! in. Parents, the star of the new vertex, and how `u−` builds again what was removed follow from that.
 
 mod cavity;
+mod families;
 mod numbers;
 mod state;
 #[cfg(test)]
 pub(super) mod tests;
 
 use super::codec::{Codec, Head, InOrder, Parts, Started, put_in_order, sections_in_order};
-use super::{OWN_FALL, QUARTERINGS, base, check_bytes};
+use super::families::{OWN_FALL, QUARTERINGS};
 use crate::format::coder::{Family, Models, Put, Source};
 use crate::format::header::Kind;
+use crate::format::limits::check_bytes;
 use crate::format::section::Section;
 use crate::format::{EncodeError, FormatError, Limits};
 use crate::mt::{
     Applied, ApplyUpdates, BaseMesh, BaseMeshError, ErrorCode, Insertion, Mt, MtInfo, MtKind,
     MultiTessellation, UpdateError, UpdateId, VertexMt,
 };
+use families::{ERROR, FAN, GIVEN_UP, GROW, PARTS, SEED};
 use numbers::{put_levels, put_one_of, put_position, read_levels, read_one_of, read_position};
-use state::State;
-
-/// By how many codes an error is below the one before.
-const ERROR: Family = base::LAST.numbers_after(1, 2);
-/// Whether all that is removed has the near vertex.
-const FAN: Family = ERROR.after(1, 2);
-/// How a coordinate differs from that of the near vertex: bits of the difference relative to those predicted.
-const OFFSET: Family = FAN.after(4, 112);
-/// Which of the tetrahedra that the new vertex lies in, as seen from the near one, is the first that is removed.
-const SEED: Family = OFFSET.after(1, 9);
-/// Whether a tetrahedron is removed.
-const GROW: Family = SEED.after(108, 2);
-/// Whether a face of the boundary is given up that the new vertex sees.
-const GIVEN_UP: Family = GROW.after(1, 2);
-/// Whether the level is about as far off as the error allows.
-const FAR: Family = GIVEN_UP.after(20, 2);
-/// How much less than the error it is off, then.
-const SHORT: Family = FAR.numbers_after(1, 0);
-/// How far the level is from what is expected.
-const LEVEL: Family = SHORT.numbers_after(40, 1);
-
-/// All families, with names for what they code.
-const PARTS: Parts = &[
-    ("errors", ERROR),
-    ("partial order", FAN),
-    ("positions", OFFSET),
-    ("partial order", SEED),
-    ("partial order", GROW),
-    ("partial order", GIVEN_UP),
-    ("levels", FAR),
-    ("levels", SHORT),
-    ("levels", LEVEL),
-];
+use state::{State, grain};
 
 /// The last [`SEED`]: none of them, its place follows.
 const ELSEWHERE: u32 = 8;
@@ -184,21 +155,6 @@ fn start(
     let mt = VertexMt::growing(info, base, rules.always_grows, tet_errors)?;
     let state = State::new(&mt, rules.grain)?;
     Ok((mt, state))
-}
-
-/// The largest numbers that all coordinates are multiples of.
-fn grain(mt: &VertexMt) -> [i32; 3] {
-    let mut grain = [0_u32; 3];
-    let inserted = (0..mt.updates()).map(|u| mt.position(UpdateId(u)));
-    for position in mt.base().positions.iter().copied().chain(inserted) {
-        for (grain, x) in grain.iter_mut().zip(position) {
-            let mut rest = x.unsigned_abs();
-            while rest > 0 {
-                (*grain, rest) = (rest, *grain % rest);
-            }
-        }
-    }
-    grain.map(|x| i32::try_from(x).unwrap_or(1).max(1))
 }
 
 /// Puts the updates `first .. end`, which follow those that were put with this state before.

@@ -1,7 +1,7 @@
 //! Positions and levels of inserted vertices, as residuals against predictions from the mesh.
 
+use super::families::{FAR, LEVEL, OFFSET, SHORT};
 use super::state::{Home, State};
-use super::{FAR, LEVEL, OFFSET, SHORT};
 use crate::format::FormatError;
 use crate::format::coder::{Put, Source};
 use crate::mt::{ErrorCode, MAX_FIELD_BITS, MtInfo, MultiTessellation, UpdateId, VertexMt};

@@ -1,11 +1,10 @@
 //! The mesh that writer and reader of insertions follow, and what is around the next vertex in it.
 
-use super::cavity::View;
-use super::grain;
 use crate::geom::{NARROW_BITS, orient3d, views_of_origin};
 use crate::mesh::{FACES, NONE};
 use crate::mt::{
-    ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, MtInfo, MultiTessellation, VertexMt, corner_of,
+    ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, MtInfo, MultiTessellation, UpdateId, VertexMt,
+    corner_of,
 };
 
 /// Most tetrahedra around a near vertex.
@@ -47,6 +46,15 @@ pub struct State {
     pub(super) epoch: u32,
 }
 
+/// How a point and a tetrahedron lie to each other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    /// Bit `k` is set if the point is on the inner side of face `k`.
+    pub(super) seen: u8,
+    /// Where the point is with respect to the sphere: 1 inside, -1 outside, 0 on it.
+    pub(super) sphere: i32,
+}
+
 /// The tetrahedron whose levels the new vertex is compared with.
 pub(super) struct Home {
     pub(super) tet: [u32; 4],
@@ -54,6 +62,21 @@ pub(super) struct Home {
     pub(super) weights: [f64; 4],
     /// Whether the vertex lies outside.
     pub(super) outside: bool,
+}
+
+/// The largest numbers that all coordinates are multiples of.
+pub(super) fn grain(mt: &VertexMt) -> [i32; 3] {
+    let mut grain = [0_u32; 3];
+    let inserted = (0..mt.updates()).map(|u| mt.position(UpdateId(u)));
+    for position in mt.base().positions.iter().copied().chain(inserted) {
+        for (grain, x) in grain.iter_mut().zip(position) {
+            let mut rest = x.unsigned_abs();
+            while rest > 0 {
+                (*grain, rest) = (rest, *grain % rest);
+            }
+        }
+    }
+    grain.map(|x| i32::try_from(x).unwrap_or(1).max(1))
 }
 
 impl State {

@@ -1,0 +1,19 @@
+//! What a file is to have besides the MT.
+
+use crate::mt::Exact;
+use std::collections::BTreeMap;
+
+/// What goes into a file besides the MT.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EncodeOptions {
+    /// Refuse an MT whose errors do not fall along its partial order by as much as requests for values rely on, too; errors that
+    /// grow are always refused. What the builders make passes.
+    pub check_margins: bool,
+    /// Exact values of fields at the vertices of the reference mesh.
+    pub exact: Vec<Exact>,
+    /// A histogram of each field over the reference mesh, some 160 bytes each, in front of the base mesh: see
+    /// [`Decoder::histogram`](super::Decoder::histogram).
+    pub histograms: bool,
+    /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
+    pub metadata: BTreeMap<String, String>,
+}
