@@ -51,8 +51,9 @@ export async function reach(page, state) {
 
 export const demo = (page, name) => page.evaluate((name) => JSON.parse(JSON.stringify(window.tetralodDemo[name] ?? null)), name);
 
-/** Changes an input as a user does and waits for the refinement that follows. */
+/** Changes an input as a user does and waits for the refinement that follows. A value that it has already asks for none. */
 export async function setSlider(page, id, value) {
+  if ((await page.inputValue(`#${id}`)) === String(value)) return demo(page, "stats");
   await page.evaluate(() => (window.tetralodDemo.stats = undefined));
   await page.fill(`#${id}`, String(value));
   await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });

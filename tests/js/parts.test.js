@@ -464,7 +464,7 @@ for (const [kind, worker] of Object.keys(blocks).flatMap(
 }
 
 test("damage is not kept in the cache", async () => {
-  bytes = blocks.edge;
+  bytes = blocks["half-edge"];
   const hashes = await hashesOf(bytes);
   // Node has no Cache Storage: as much of one as is needed.
   const store = new Map();

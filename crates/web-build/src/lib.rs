@@ -194,11 +194,11 @@ impl MeshBuilder {
                 continue;
             }
             if has(&survey.cell_fields, name) {
-                return Err(BuildError::CellField { name: name.clone() }.into());
+                return Err(refused(&BuildError::CellField { name: name.clone() }));
             }
             let all = survey.fields.iter().chain(survey.cell_fields.iter().filter(|_| *cells));
             let known = all.map(|field| field.name.clone()).collect();
-            return Err(BuildError::UnknownField { name: name.clone(), known }.into());
+            return Err(refused(&BuildError::UnknownField { name: name.clone(), known }));
         }
         Ok(())
     }
@@ -514,9 +514,14 @@ fn bad_mesh(name: &str, error: &MeshError) -> WebError {
 
 /// An error of the builder with the name of the file, where it is about what that contains.
 fn in_input(name: &str, error: &BuildError) -> WebError {
+    let WebError { code, message } = refused(error);
+    WebError::new(code, if code == "bad-mesh" { format!("{name}: {message}") } else { message })
+}
+
+/// An error of the builder with the option of the page that helps.
+fn refused(error: &BuildError) -> WebError {
     let option = error.remedy().map(|remedy| format!(" (option {})", options_of(remedy)));
-    let place = if error.code() == "bad-mesh" { format!("{name}: ") } else { String::new() };
-    WebError::new(error.code(), format!("{place}{error}{}", option.unwrap_or_default()))
+    WebError::new(error.code(), format!("{error}{}", option.unwrap_or_default()))
 }
 
 /// The options of the page that do what a remedy says.
