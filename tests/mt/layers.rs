@@ -24,8 +24,9 @@ const EDGES: [(&str, &[&str]); 11] = [
     ("SystemTime", &["cli/src", "src/stream/http"]),
 ];
 
-const WEB: [&str; 5] = [
+const WEB: [&str; 6] = [
     "crates/web/src",
+    "crates/web-options/src",
     "crates/web-core/src",
     "crates/web-viewer/src",
     "crates/web-build/src",

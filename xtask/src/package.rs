@@ -40,8 +40,14 @@ pub const PUBLISHED: [&str; 6] =
     ["tetralod", "tetralod-io", "tetralod-build", "tetralod-render", "tetralod-bench", "tetralod-cli"];
 
 /// All crates that are for browsers alone.
-pub const CRATES: [&str; 5] =
-    ["tetralod-web", MODULES[0].package, MODULES[1].package, MODULES[2].package, BENCH.package];
+pub const CRATES: [&str; 6] = [
+    "tetralod-web",
+    "tetralod-web-options",
+    MODULES[0].package,
+    MODULES[1].package,
+    MODULES[2].package,
+    BENCH.package,
+];
 
 /// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.
 const WASM_FEATURES: [&str; 6] = [

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 use tetralod_bench::{self as bench, BenchReport, Coherent};
-use tetralod_web::error::WebError;
 use tetralod_web::file::now;
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::wasm_bindgen;
 

@@ -20,7 +20,7 @@ use tetralod_build::{self as builder, BuildConfig, BuildError, BuildProgress, Bu
 use tetralod_io::{
     self as io, CellData, FieldSelection, MemoryLimit, ReadError, ReadOptions, Survey, read_time_steps,
 };
-use tetralod_web::error::WebError;
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 

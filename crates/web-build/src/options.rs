@@ -7,9 +7,9 @@ use tetralod::mt::MtKind;
 use tetralod_build::{
     BuildConfig, BuildCriterion, Construction, ConstructionChoice, FieldPrecision, Method, Purpose,
 };
-use tetralod_web::error::WebError;
-use tetralod_web::given::{Given, percentage};
-use tetralod_web::read_error::ReadError;
+use tetralod_web_options::error::WebError;
+use tetralod_web_options::given::{Given, percentage};
+use tetralod_web_options::read_error::ReadError;
 use wasm_bindgen::JsValue;
 
 /// The names of all options.

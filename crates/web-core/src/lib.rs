@@ -2,13 +2,13 @@
 
 use tetralod::mt::{MeshChanges, MtInfo};
 use tetralod::session::Session;
-use tetralod_web::error::WebError;
 use tetralod_web::file::File;
 use tetralod_web::loader::RangeLoader;
 use tetralod_web::mesh_changes::{self, Changes};
 use tetralod_web::mesh_tools;
 use tetralod_web::options::{RefineOptions, field_index};
 use tetralod_web::results::{self, JsBlocks, JsDelta, JsInfo, JsMesh, JsProgress, JsStats};
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 

@@ -22,13 +22,13 @@ use tetralod_render::SceneRenderer;
 use tetralod_render::gpu::{Renderer, SideTarget};
 use tetralod_render::scene::{Legend, SceneState};
 use tetralod_web::arrays::{doubles, list, object, objects, set};
-use tetralod_web::error::WebError;
 use tetralod_web::file::File;
 use tetralod_web::loader::RangeLoader;
 use tetralod_web::mesh_tools;
 use tetralod_web::options::RefineOptions;
-use tetralod_web::reader::read;
 use tetralod_web::results::{self, JsBlocks, JsInfo, JsMesh, JsProgress, JsStats};
+use tetralod_web_options::error::WebError;
+use tetralod_web_options::reader::read;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 

@@ -1,7 +1,7 @@
 //! Pictures of any size, drawn on a canvas of their own beside the one of the page.
 
 use crate::Viewer;
-use tetralod_web::error::WebError;
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen]

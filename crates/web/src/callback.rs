@@ -1,14 +1,14 @@
 //! A need that a JavaScript function decides: it gets many tetrahedra at once and returns the excess of each.
 
 use crate::arrays::{doubles, object};
-use crate::error::WebError;
-use crate::read_error::list;
 use js_sys::{Function, Object, Reflect};
 use std::cell::RefCell;
 use std::fmt;
 use tetralod::geom::Lattice;
 use tetralod::mt::{FieldInfo, MtInfo};
 use tetralod::refine::{ANY, Criterion, TetData, Verdict};
+use tetralod_web_options::error::WebError;
+use tetralod_web_options::read_error::list;
 use wasm_bindgen::JsValue;
 
 /// A function gets at most so many tetrahedra in a call, so that its arrays stay small.

@@ -1,7 +1,6 @@
 //! What both classes hold: a file that is being read, whole or in parts, and the mesh that is made of it.
 
 use crate::callback;
-use crate::error::WebError;
 use crate::loader::{RangeLoader, SharedLoader};
 use crate::options::{Asked, asked};
 use crate::results::{self, JsBlocks, JsProgress, JsStats};
@@ -11,6 +10,7 @@ use tetralod::mt::MtInfo;
 use tetralod::refine::{RefineStats, Request, View};
 use tetralod::remote::{Remote, Step};
 use tetralod::session::{Progress, Session};
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 

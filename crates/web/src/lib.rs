@@ -7,15 +7,11 @@
 
 pub mod arrays;
 pub mod callback;
-pub mod error;
 pub mod file;
-pub mod given;
 pub mod loader;
 pub mod mesh_changes;
 pub mod mesh_tools;
 pub mod options;
-pub mod read_error;
-pub mod reader;
 pub mod results;
 pub mod stored;
 pub mod tools;

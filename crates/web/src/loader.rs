@@ -1,12 +1,12 @@
 //! The loader of byte ranges, for `ranges.js`: what it says to do comes out as objects, what happens goes in as numbers.
 
 use crate::arrays::object;
-use crate::error::WebError;
 use js_sys::{Array, Uint8Array};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
 use tetralod::stream::{Action, Failure, Loader, LoaderOptions, ResponseHead, WantedRange};
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 

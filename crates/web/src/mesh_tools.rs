@@ -6,7 +6,7 @@ macro_rules! mesh_tools {
     ($class:ident) => {
         const _: () = {
             use tetralod::view::NormalKind;
-            use $crate::error::WebError;
+            use tetralod_web_options::error::WebError;
             use $crate::options::field_index;
             use $crate::tools;
 

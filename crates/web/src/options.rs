@@ -1,14 +1,14 @@
 //! What JavaScript asks for, checked: every refusal names the option.
 
 use crate::callback::Callback;
-use crate::error::WebError;
-use crate::given::Given;
-use crate::read_error::ReadError;
 use js_sys::Function;
 use std::sync::Arc;
 use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
 use tetralod::refine::{Budget, Criterion, Need, Part, Region, Request, RequestError, Transfer, View};
+use tetralod_web_options::error::WebError;
+use tetralod_web_options::given::Given;
+use tetralod_web_options::read_error::ReadError;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 

@@ -1,9 +1,9 @@
 //! How numbers of a mesh are stored in arrays of single precision: what they are relative to, beside them.
 
 use crate::arrays::{floats, list, set};
-use crate::error::WebError;
 use tetralod::geom::{SinglePoints, SingleValues};
 use tetralod::mt::MtInfo;
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsValue;
 
 /// How positions and the values of a field are stored. JavaScript knows it as `origin`, `offset` and `scale`: a position is `origin + p`, a

@@ -1,13 +1,13 @@
 //! What can be got out of a mesh besides itself: surfaces, sections, values along lines, sums.
 
 use crate::arrays::{doubles, floats, integers, object, objects, set};
-use crate::error::WebError;
 use crate::stored::Stored;
 use js_sys::{Array, Object};
 use tetralod::view::{
     BoundarySurface, FieldStats, Histogram, IsoSurface, MeshView, Plane, Probe, Slice, Streamline,
     TraceOptions, Tracer,
 };
+use tetralod_web_options::error::WebError;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 

@@ -1,6 +1,6 @@
 //! `INFO`: the description of an MT.
 
-use super::kind_codec::{CODECS, codec_of};
+use super::kind_codec::{CODECS, number_of};
 use crate::format::read::{MAX_STRING, Reader};
 use crate::format::{EncodeError, FormatError, write};
 use crate::geom::Lattice;
@@ -27,8 +27,8 @@ pub fn write_info(
     if !metadata.iter().all(|(key, value)| fits(key) && fits(value)) {
         return Err(EncodeError::TooLong { what: "a metadata key or value" });
     }
-    let codec = codec_of(info.kind).ok_or(EncodeError::Kind { kind: info.kind })?;
-    out.push(codec.number);
+    let number = number_of(info.kind).ok_or(EncodeError::Kind { kind: info.kind })?;
+    out.push(number);
     for count in [info.vertices, info.tetrahedra, info.updates] {
         write::u32(out, count);
     }
