@@ -87,10 +87,23 @@ pub fn run(args: &[String]) -> Result<()> {
     }
     let chosen: Vec<&Step> =
         STEPS.iter().filter(|step| args.is_empty() || args.iter().any(|name| name == step.name)).collect();
+    if args.is_empty() {
+        install_programs()?;
+    }
     match chosen[..] {
         [step] => run_here(step),
         _ => run_side_by_side(chosen),
     }
+}
+
+/// Installs what steps need of the system and is not there, one after the other: the system's installer lets in one at a time.
+fn install_programs() -> Result<()> {
+    browser::vulkan_driver()?;
+    browser::require()?;
+    browser::firefox()?;
+    browser::nginx()?;
+    shell::add_wasm_target()?;
+    shell::install_node_tools()
 }
 
 fn run_here(step: &Step) -> Result<()> {
