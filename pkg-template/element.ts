@@ -17,6 +17,7 @@
  * else is shown over the picture. Parts for `::part()`: `canvas`, `poster`, `message`.
  */
 
+import type { Class, TypedEvents } from "./events.js";
 import { DISPOSE } from "./dispose.js";
 import { TetralodError, known } from "./errors.js";
 import type { MtInfo } from "./results.js";
@@ -130,7 +131,7 @@ const KEY_MOVE = 0.05;
 const ARROWS: Record<string, [right: number, up: number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** Servers that render pages have no elements. */
-const Base = (globalThis.HTMLElement ?? class {}) as typeof HTMLElement;
+const Base = (globalThis.HTMLElement ?? class {}) as Class<TypedEvents<TetralodViewerEventMap> & HTMLElement>;
 
 /** Properties reflect attributes of the same name (`maxTets` is `max-tets`); `null` removes an attribute. */
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the properties are defined below, each by the name of its attribute.
@@ -241,20 +242,6 @@ export class TetralodViewerElement extends Base {
   /** Ends the worker and frees its memory, as when the element is removed. */
   [DISPOSE](): void {
     this.#stop();
-  }
-
-  override addEventListener<K extends keyof TetralodViewerEventMap>(
-    type: K,
-    listener: (event: TetralodViewerEventMap[K]) => void,
-    options?: boolean | AddEventListenerOptions,
-  ): void;
-  override addEventListener(
-    type: string,
-    listener: EventListenerOrEventListenerObject | null,
-    options?: boolean | AddEventListenerOptions,
-  ): void;
-  override addEventListener(type: string, listener: any, options?: boolean | AddEventListenerOptions): void {
-    super.addEventListener(type, listener, options);
   }
 
   async #start() {

@@ -216,7 +216,7 @@ type Core = Remote<CoreMethods> | Local;
 /**
  * A volume that is open. Calls are answered in the order in which they were made.
  */
-export class MultiTessellation extends withMeshTools<AsideOptions>() {
+export class MultiTessellation extends withMeshTools<AsideOptions, MultiTessellationEventMap>() {
   #core: Core;
   #info: MtInfo | undefined;
   #progress: Progress = { ready: false, complete: false, bytes: 0, total: undefined, updates: 0 };
@@ -489,20 +489,6 @@ export class MultiTessellation extends withMeshTools<AsideOptions>() {
   /** The same as {@link MultiTessellation.free}, for `using mt = await MultiTessellation.open(...)`. */
   [DISPOSE](): void {
     this.free();
-  }
-
-  override addEventListener<K extends keyof MultiTessellationEventMap>(
-    type: K,
-    listener: (event: MultiTessellationEventMap[K]) => void,
-    options?: boolean | AddEventListenerOptions,
-  ): void;
-  override addEventListener(
-    type: string,
-    listener: EventListenerOrEventListenerObject | null,
-    options?: boolean | AddEventListenerOptions,
-  ): void;
-  override addEventListener(type: string, listener: any, options?: boolean | AddEventListenerOptions): void {
-    super.addEventListener(type, listener, options);
   }
 
   #close(reason: Error) {

@@ -1,6 +1,7 @@
 /** What can be got out of the current mesh: the same calls in `MultiTessellation` and in `Viewer`. */
 
 import { TetralodError, badOption } from "./errors.js";
+import type { Class, TypedEvents } from "./events.js";
 import { type RefineOptions, type Unchecked, checkAmount, checkNames } from "./options.js";
 import type { BlockProgress, CoreStats, FieldStats, IsoSurface, LineProfile, MtInfo, RefineStats, Slice, Streamline, Surface } from "./results.js";
 import { type KnownField, type WantedFields, fieldsOf, withFields } from "./stored.js";
@@ -123,7 +124,7 @@ async function call(object: object, method: keyof ToolMethods, args: unknown[], 
 }
 
 /** An object with these calls and events. */
-export type WithMeshTools<Aside> = { new (): EventTarget & MeshTools<Aside>; prototype: EventTarget & MeshTools<Aside> };
+export type WithMeshTools<Aside, Events> = Class<TypedEvents<Events> & EventTarget & MeshTools<Aside>>;
 
 /** The base class of what has these calls. */
 class MeshCaller extends EventTarget implements MeshTools<AsideOptions> {
@@ -184,8 +185,8 @@ class MeshCaller extends EventTarget implements MeshTools<AsideOptions> {
   }
 }
 
-/** The same as a base class whose options are `Aside`. */
-export const withMeshTools = <Aside>() => MeshCaller as unknown as WithMeshTools<Aside>;
+/** {@link MeshCaller} as a base class whose options are `Aside`, and whose events are those of `Events`. */
+export const withMeshTools = <Aside, Events>() => MeshCaller as unknown as WithMeshTools<Aside, Events>;
 
 /** What answers these calls: the session of a wasm module. */
 interface ToolSession {

@@ -21,7 +21,16 @@ import { type Deferred, Latest, type Update, deferred, mergeUpdates } from "./la
 import { type Need, type ReadOptions, type Reading as Fetching, type RefineOptions, type Unchecked, type ViewOptions, checkAmount, checkNames, openOptions, sendable } from "./options.js";
 import type { BlockMap, BlockProgress, Mesh, MtInfo, RefineStats } from "./results.js";
 import type { Remote } from "./rpc.js";
-import type {
+import type { CameraState, Legend, Misfit, Overlay, Reading, SceneState, ViewerChanges, ViewerState } from "./scene.js";
+import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
+import { absolute } from "./stored.js";
+import { type OpenSource, type RangesSource, type Source, abortable, openSource, pump, rangesOf } from "./stream.js";
+import { type AwaitOptions, type FieldOptions, setCaller, withMeshTools } from "./tools.js";
+import type { ViewerMethods } from "./viewer-worker.js";
+
+export { TetralodError, absolute };
+export type { BlockMap } from "./results.js";
+export type {
   ArrowState,
   AxisOverlay,
   BoundaryState,
@@ -42,35 +51,6 @@ import type {
   ViewerState,
   VolumeState,
 } from "./scene.js";
-import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
-import { absolute } from "./stored.js";
-import { type OpenSource, type RangesSource, type Source, abortable, openSource, pump, rangesOf } from "./stream.js";
-import { type AwaitOptions, type FieldOptions, setCaller, withMeshTools } from "./tools.js";
-import type { ViewerMethods } from "./viewer-worker.js";
-
-export { TetralodError, absolute };
-export type {
-  ArrowState,
-  AxisOverlay,
-  BlockMap,
-  BoundaryState,
-  CameraState,
-  CellState,
-  ColourState,
-  CompareState,
-  IsosurfaceState,
-  Legend,
-  Misfit,
-  Overlay,
-  PlaneState,
-  Reading,
-  SceneState,
-  SliceState,
-  StreamlineState,
-  ViewerChanges,
-  ViewerState,
-  VolumeState,
-};
 
 /** How much of a file has arrived. */
 export interface ViewerProgress {
@@ -261,7 +241,7 @@ type Waiting = Deferred<ViewerStats> & { goal: number };
  * await viewer.set({ isosurfaces: [{ value: min + 0.6 * (max - min), opacity: 0.5 }], volume: {} });
  * ```
  */
-export class Viewer extends withMeshTools<AwaitOptions & { request?: never }>() {
+export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, ViewerEventMap>() {
   #remote: Remote<ViewerMethods>;
   #canvas: HTMLCanvasElement;
   #observer: ResizeObserver | undefined;
@@ -788,20 +768,6 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }>() 
   /** The same as {@link Viewer.free}, for `using`. */
   [DISPOSE](): void {
     this.free();
-  }
-
-  override addEventListener<K extends keyof ViewerEventMap>(
-    type: K,
-    listener: (event: ViewerEventMap[K]) => void,
-    options?: boolean | AddEventListenerOptions,
-  ): void;
-  override addEventListener(
-    type: string,
-    listener: EventListenerOrEventListenerObject | null,
-    options?: boolean | AddEventListenerOptions,
-  ): void;
-  override addEventListener(type: string, listener: any, options?: boolean | AddEventListenerOptions): void {
-    super.addEventListener(type, listener, options);
   }
 }
 

@@ -54,6 +54,7 @@ const TYPES = [
   "dispose",
   "element",
   "errors",
+  "events",
   "index",
   "inline",
   "options",
