@@ -72,7 +72,7 @@ fn read(path: &Path) -> Option<Set> {
 
 /// Writes the MT file of a generated volume.
 pub fn make(size: u32, kind: &str, file: &Path) -> Result<()> {
-    let kind = MtKind::OF_FILES.into_iter().find(|known| known.name() == kind).ok_or("no such kind")?;
+    let kind = MtKind::ALL.into_iter().find(|known| known.name() == kind).ok_or("no such kind")?;
     fs::write(file, mt_file(&generate::bucky(size)?, kind, Purpose::default())?)?;
     Ok(())
 }

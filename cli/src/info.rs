@@ -284,7 +284,6 @@ fn words(kind: MtKind) -> &'static str {
         MtKind::Edge => "edge collapse",
         MtKind::Vertex => "vertex insertion",
         MtKind::HalfEdge => "half-edge insertion",
-        MtKind::Explicit => "explicit",
     }
 }
 

@@ -1,6 +1,6 @@
 //! Section 5's code of T_u beside ours: both as structures in memory, measured.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use std::collections::BTreeSet;
 use tetralod::mt::{
     ExplicitMt, MostNeighbors, Mt, MtKind, MultiTessellation, TreeExceptions, UpdateId, VertexTreeMt,
@@ -46,7 +46,7 @@ impl NodeCodes {
         if mt.info().kind != MtKind::Vertex || mt.has_tet_errors() {
             return Ok(None);
         }
-        let Mt::Explicit(mt) = mt.convert(MtKind::Explicit)? else { bail!("not an explicit MT") };
+        let mt = ExplicitMt::of(mt)?;
         let (narrow, remover_bits) = Trees::of(&mt, MostNeighbors::ThirtyTwo)?;
         let (wide, _) = Trees::of(&mt, MostNeighbors::SixtyFour)?;
         let neighbors: Vec<u32> = (0..mt.updates()).map(|u| neighbors(&mt, UpdateId(u))).collect();
@@ -96,7 +96,7 @@ mod tests {
         let data = DataSet::by_insertion("small", &points, &[Recipe::Delaunay, Recipe::HalfEdge]).unwrap();
         for model in &data.models {
             let codes = NodeCodes::of(&model.mt).unwrap().expect("a vertex-based MT");
-            let Mt::Explicit(mt) = model.mt.convert(MtKind::Explicit).unwrap() else { panic!() };
+            let mt = ExplicitMt::of(&model.mt).unwrap();
             let updates = || (0..mt.updates()).map(UpdateId);
             let p: u64 = updates().map(|u| mt.removed(u).len() as u64).sum();
             let q: u64 = updates().map(|u| boundary_faces(&mt, u)).sum();

@@ -1,9 +1,9 @@
 //! Why a promise costs what it costs: the error that each tetrahedron of an MT has by itself, beside the error below
 //! which its update is needed because of those that depend on it.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId};
+use tetralod::mt::{ErrorCode, ExplicitMt, MultiTessellation, UpdateId, VertexId};
 
 use crate::markdown::{Table, count, percent};
 use crate::model::{DataSet, Recipe};
@@ -25,7 +25,7 @@ pub struct Own {
 /// Looks at all MTs of a data set.
 pub fn own(data: &DataSet) -> Result<Vec<Own>> {
     let of = |model: &crate::model::Model| -> Result<Own> {
-        let Mt::Explicit(mt) = model.mt.convert(MtKind::Explicit)? else { bail!("not an explicit MT") };
+        let mt = ExplicitMt::of(&model.mt)?;
         Ok(of(model.recipe, &mt, &data.reference))
     };
     data.models.iter().filter(|model| model.recipe != Recipe::InsertOwn).map(of).collect()

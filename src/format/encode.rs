@@ -14,7 +14,7 @@ use super::payload::histogram::Histograms;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::section::Section;
 use super::{EncodeError, EncodeOptions, checksum, payload};
-use crate::mt::{Exact, Mt, MultiTessellation, VertexId};
+use crate::mt::{Exact, Mt, VertexId};
 use std::collections::BTreeMap;
 use std::io;
 
@@ -38,7 +38,6 @@ pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -
         Mt::Edge(mt) => encode_kind(mt, options, writer),
         Mt::Vertex(mt) => encode_kind(mt, options, writer),
         Mt::HalfEdge(mt) => encode_kind(mt, options, writer),
-        Mt::Explicit(mt) => Err(EncodeError::Kind { kind: mt.info().kind }),
     }
 }
 
@@ -201,7 +200,6 @@ pub fn breakdown(mt: &Mt) -> Result<Vec<(&'static str, f64)>, EncodeError> {
         Mt::Edge(mt) => breakdown_of(mt),
         Mt::Vertex(mt) => breakdown_of(mt),
         Mt::HalfEdge(mt) => breakdown_of(mt),
-        Mt::Explicit(mt) => Err(EncodeError::Kind { kind: mt.info().kind }),
     }
 }
 

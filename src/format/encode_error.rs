@@ -1,6 +1,6 @@
 //! Why an MT cannot be written to a file.
 
-use crate::mt::{BaseMeshError, MtKind, UpdateError};
+use crate::mt::{BaseMeshError, UpdateError};
 use std::io;
 use thiserror::Error;
 
@@ -8,12 +8,6 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EncodeError {
-    /// No file has MTs of this kind.
-    #[error("an MT of kind {} lives in memory alone; convert it to the kind that it was made of", .kind.name())]
-    Kind {
-        /// The kind.
-        kind: MtKind,
-    },
     /// Not all updates of the MT are there.
     #[error(
         "the MT has {updates} of the {expected} updates that its description contains; write it when it is complete"

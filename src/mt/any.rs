@@ -3,9 +3,8 @@
 use super::replay::replay;
 use super::stats::bounds;
 use super::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, HalfEdgeMt,
-    LookAtTet, MtInfo, MultiTessellation, PageError, ReplayError, UpdateError, UpdateId, UpdatePages,
-    VertexMt,
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ErrorCode, HalfEdgeMt, LookAtTet,
+    MtInfo, MultiTessellation, PageError, ReplayError, UpdateError, UpdateId, UpdatePages, VertexMt,
 };
 use enum_dispatch::enum_dispatch;
 use std::ops::Range;
@@ -21,8 +20,6 @@ pub enum Mt {
     Vertex(VertexMt),
     /// A compact half-edge MT.
     HalfEdge(HalfEdgeMt),
-    /// An explicit MT, which no file holds.
-    Explicit(ExplicitMt),
 }
 
 impl Mt {
@@ -42,14 +39,12 @@ impl Mt {
                 Self::Edge(mt) => mt.info.bounds = bounds,
                 Self::Vertex(mt) => mt.info.bounds = bounds,
                 Self::HalfEdge(mt) => mt.info.bounds = bounds,
-                Self::Explicit(mt) => mt.info.bounds = bounds,
             }
         }
         Ok(())
     }
 
-    /// The MT, complete, with `2^bits` updates in each page: the blocks of its file. Kinds edge and vertex only note it for that; an explicit MT
-    /// has no file, and stays as it is.
+    /// The MT, complete, with `2^bits` updates in each page: the blocks of its file. Kinds edge and vertex only note it for that.
     ///
     /// # Errors
     /// If an update is not here.
@@ -66,7 +61,6 @@ impl Mt {
                 mt.set_page_bits(bits);
                 mt.into()
             }
-            Self::Explicit(_) => self.clone(),
         })
     }
 }

@@ -13,20 +13,28 @@ impl Mt {
     /// If that kind cannot hold them.
     pub fn convert(&self, to: MtKind) -> Result<Self, ConvertError> {
         let from = self.info().kind;
-        match (self, to) {
+        match (from, to) {
             _ if from == to => Ok(self.clone()),
-            (_, MtKind::Explicit) => Ok(Self::Explicit(ExplicitMt::of(self)?)),
-            (Self::Explicit(mt), MtKind::Vertex) => Ok(Self::Vertex(VertexMt::from_explicit(mt)?)),
-            (Self::Explicit(mt), MtKind::HalfEdge) => {
-                Ok(Self::HalfEdge(HalfEdgeMt::from_explicit(mt, to.usual_block_bits())?))
-            }
-            (Self::Explicit(mt), MtKind::Edge) => Ok(Self::Edge(EdgeMt::from_explicit(mt)?)),
             // Both are made of vertex insertions.
-            (Self::Vertex(_), MtKind::HalfEdge) | (Self::HalfEdge(_), MtKind::Vertex) => {
-                Self::Explicit(ExplicitMt::of(self)?).convert(to)
+            (MtKind::Vertex, MtKind::HalfEdge) | (MtKind::HalfEdge, MtKind::Vertex) => {
+                ExplicitMt::of(self)?.compact(to)
             }
             _ => Err(ConvertError::Kinds { from, to }),
         }
+    }
+}
+
+impl ExplicitMt {
+    /// The updates as a compact MT, in as many blocks as its kind usually has.
+    ///
+    /// # Errors
+    /// If that kind cannot hold them.
+    pub fn compact(&self, to: MtKind) -> Result<Mt, ConvertError> {
+        Ok(match to {
+            MtKind::Edge => EdgeMt::from_explicit(self)?.into(),
+            MtKind::Vertex => VertexMt::from_explicit(self)?.into(),
+            MtKind::HalfEdge => HalfEdgeMt::from_explicit(self, to.usual_block_bits())?.into(),
+        })
     }
 }
 

@@ -14,13 +14,11 @@ pub enum MtKind {
     /// Vertex insertions whose inverse collapses a vertex onto a neighbour, stored so that any part can be read without
     /// the rest.
     HalfEdge,
-    /// Updates of any kind, every tetrahedron stored [§3]: in memory alone, no file has it.
-    Explicit,
 }
 
 impl MtKind {
-    /// The kinds that files have: all but [`MtKind::Explicit`].
-    pub const OF_FILES: [Self; 3] = [Self::HalfEdge, Self::Edge, Self::Vertex];
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::HalfEdge, Self::Edge, Self::Vertex];
 
     /// Whether MTs of this kind can come in pages of updates: see `Mt::is_paged`.
     pub fn is_paged(self) -> bool {
@@ -32,13 +30,12 @@ impl MtKind {
         if self == Self::HalfEdge { 8 } else { 11 }
     }
 
-    /// The kind in one word: `half-edge`, `edge`, `vertex` or `explicit`.
+    /// The kind in one word: `half-edge`, `edge` or `vertex`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Edge => "edge",
             Self::Vertex => "vertex",
             Self::HalfEdge => "half-edge",
-            Self::Explicit => "explicit",
         }
     }
 }

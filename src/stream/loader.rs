@@ -4,6 +4,7 @@ use super::error::StreamError;
 use super::range_set::RangeSet;
 use super::reassembly::Reassembly;
 use super::response::{ResponseContent, ResponseHead, UNKNOWN};
+use foldhash::HashSet;
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -123,8 +124,8 @@ pub struct Loader {
     /// Bytes of `wanted` that are.
     reassembly: Reassembly,
     ready: VecDeque<(Range<u64>, Vec<u8>)>,
-    /// Ranges that a cache has, in order, and those of them that are being read.
-    cached: Vec<Range<u64>>,
+    /// Ranges that a cache has, and those of them that are being read.
+    cached: HashSet<Range<u64>>,
     reading: Vec<Range<u64>>,
     requests: Vec<Request>,
     pauses: Vec<Pause>,
@@ -338,9 +339,7 @@ impl Loader {
 
     /// Says of more ranges that a cache has them: those that are wanted are read from there.
     pub fn add_cached(&mut self, ranges: &[Range<u64>]) {
-        self.cached.extend_from_slice(ranges);
-        self.cached.sort_unstable_by_key(|range| (range.start, range.end));
-        self.cached.dedup();
+        self.cached.extend(ranges.iter().cloned());
     }
 
     /// There is no cache any more.
@@ -360,12 +359,12 @@ impl Loader {
     /// The cache does not have a range any more.
     pub fn lost(&mut self, range: &Range<u64>) {
         self.reading.retain(|reading| reading != range);
-        self.cached.retain(|cached| cached != range);
+        self.cached.remove(range);
     }
 
     /// The complete ranges that have not been taken, without those from a cache.
     pub fn uncached(&self) -> impl Iterator<Item = (&Range<u64>, &[u8])> {
-        let new = self.ready.iter().filter(|(range, _)| !self.is_cached(range));
+        let new = self.ready.iter().filter(|(range, _)| !self.cached.contains(range));
         new.map(|(range, bytes)| (range, &bytes[..]))
     }
 
@@ -430,17 +429,13 @@ impl Loader {
         self.reassembly.len() + self.ready.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>()
     }
 
-    fn is_cached(&self, range: &Range<u64>) -> bool {
-        self.cached.binary_search_by_key(&(range.start, range.end), |range| (range.start, range.end)).is_ok()
-    }
-
     /// A range that is wanted, that a cache has, and that is not being read.
     fn readable(&self) -> Option<Range<u64>> {
-        if self.cached.is_empty() {
-            return None;
-        }
         let ranges = self.wanted.iter().map(|wanted| &wanted.range);
-        ranges.filter(|range| self.is_cached(range)).find(|range| !self.reading.contains(range)).cloned()
+        ranges
+            .filter(|range| self.cached.contains(range))
+            .find(|range| !self.reading.contains(range))
+            .cloned()
     }
 
     fn position(&self, id: u32) -> Option<usize> {

@@ -41,7 +41,7 @@ fn without(bytes: &[u8], updates: u32) -> Vec<u8> {
 
 #[test]
 fn it_is_that_of_the_reference_mesh_for_all_kinds() {
-    for (mesh, kind) in meshes().iter().flat_map(|mesh| MtKind::OF_FILES.map(|kind| (mesh, kind))) {
+    for (mesh, kind) in meshes().iter().flat_map(|mesh| MtKind::ALL.map(|kind| (mesh, kind))) {
         let mt = built(mesh, kind);
         let found = stats(&mt).expect("a sound MT").bounds;
         assert_eq!(mt.info().bounds, Some(found), "{}", kind.name());
@@ -61,7 +61,7 @@ fn it_is_that_of_the_reference_mesh_for_all_kinds() {
 
 #[test]
 fn a_file_without_it_has_a_box_that_is_a_little_larger() {
-    for (mesh, kind) in meshes().iter().flat_map(|mesh| MtKind::OF_FILES.map(|kind| (mesh, kind))) {
+    for (mesh, kind) in meshes().iter().flat_map(|mesh| MtKind::ALL.map(|kind| (mesh, kind))) {
         let mt = built(mesh, kind);
         let updates = mt.updates();
         let exact = decoder(&written(&mt)).bounds().expect("a box");

@@ -34,8 +34,8 @@ fn edge_example() -> Mt {
 }
 
 /// The only update puts a vertex into the first tetrahedron.
-fn explicit_example() -> Mt {
-    let (info, base) = start(MtKind::Explicit, [6, 5, 1]);
+fn explicit_example() -> ExplicitMt {
+    let (info, base) = start(MtKind::Vertex, [6, 5, 1]);
     let mut mt = ExplicitMt::new(info, base);
     let update = ExplicitUpdate {
         positions: &[[8, 6, 11]],
@@ -45,17 +45,17 @@ fn explicit_example() -> Mt {
         errors: &[ErrorCode(300)],
     };
     mt.push(&update).expect("the example is an MT");
-    mt.into()
+    mt
 }
 
 /// The same update in a vertex-based MT.
 fn vertex_example() -> Mt {
-    explicit_example().convert(MtKind::Vertex).expect("an insertion")
+    explicit_example().compact(MtKind::Vertex).expect("an insertion")
 }
 
 /// The same update in a half-edge MT: its vertex collapses onto one of the tetrahedron's.
 fn half_edge_example() -> Mt {
-    let mt = explicit_example().convert(MtKind::HalfEdge).expect("a half-edge insertion");
+    let mt = explicit_example().compact(MtKind::HalfEdge).expect("a half-edge insertion");
     mt.in_pages(11).expect("a complete MT")
 }
 

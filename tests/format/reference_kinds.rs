@@ -32,8 +32,8 @@ fn compare(bytes: &[u8]) -> (File, Vec<Change>) {
 }
 
 fn spelled_out(mt: &Mt) -> ExplicitMt {
-    match mt.convert(MtKind::Explicit) {
-        Ok(Mt::Explicit(mt)) => mt,
+    match ExplicitMt::of(mt) {
+        Ok(mt) => mt,
         other => panic!("not spelled out: {:?}", other.err()),
     }
 }

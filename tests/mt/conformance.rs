@@ -2,8 +2,8 @@
 //! any order, it is Σ_S as the DAG tells it, and it is within the error that S promises.
 
 use crate::support::conformance::{
-    Corners, DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, Input, PAGED, SPELLED_EDGE, SPELLED_VERTEX, Subject,
-    deviation, empty, grow, in_order, inputs, random_input,
+    Corners, DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, Input, PAGED, Subject, deviation, empty, grow,
+    in_order, inputs, random_input,
 };
 use crate::support::domains::Domain;
 use crate::support::meshes::{blocks, hilly};
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use std::collections::{HashMap, HashSet};
 use tetralod::geom::Bounds;
 use tetralod::mt::{
-    Applied, ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, MostNeighbors, Mt, MtKind, MultiTessellation,
+    Applied, ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, MostNeighbors, Mt, MultiTessellation,
     UpdateId, UpdatePages, VertexTreeMt, stats,
 };
 use tetralod::refine::{Budget, Front, LodCriterion, Need, Outcome, Region, Request};
@@ -66,11 +66,9 @@ macro_rules! conformance {
 
 conformance! {
     edge: EDGE,
-    explicit_of_edge: SPELLED_EDGE,
     vertex_by_half_edges: HALF_EDGE,
     vertex_by_delaunay_removal: DELAUNAY,
     vertex_by_delaunay_insertion: INSERTED,
-    explicit_of_vertex: SPELLED_VERTEX,
     half_edge_in_pages: PAGED,
 }
 
@@ -114,6 +112,8 @@ macro_rules! conformance_in_memory {
 }
 
 conformance_in_memory! {
+    explicit_of_edge: EDGE, explicit,
+    explicit_of_vertex: HALF_EDGE, explicit,
     trees_by_half_edges: HALF_EDGE, narrow_trees,
     trees_by_half_edges_for_64_neighbors: HALF_EDGE, wide_trees,
     trees_by_delaunay_removal: DELAUNAY, narrow_trees,
@@ -124,6 +124,10 @@ conformance_in_memory! {
 /// The structure that the builder made.
 fn as_built(subject: &Subject) -> Mt {
     subject.mt.clone()
+}
+
+fn explicit(subject: &Subject) -> ExplicitMt {
+    subject.explicit.clone()
 }
 
 /// The paper's node code, with 12 bits for a boundary face.
@@ -461,25 +465,18 @@ fn random_mt(how: How, domain: Domain, seed: u64, fields: usize) {
     walk.wander(150, &mut random);
     walk.assert_hash_of_the_set();
     walk.go_back(&mut random);
-    if let Some(mt) = converted(how, &subject.mt) {
-        assert_eq!(mt, subject.mt);
-    }
+    assert_eq!(by_the_explicit(&subject.mt), subject.mt);
     within_errors(&subject, 3, &mut random);
 }
 
-/// The same MT by way of the explicit one, if it is not that already.
-fn converted(how: How, mt: &Mt) -> Option<Mt> {
-    let spelled = mt.convert(MtKind::Explicit).expect("any MT can be spelled out");
-    assert_eq!(spelled.info().kind, MtKind::Explicit);
-    assert_eq!(spelled.convert(MtKind::Explicit).as_ref(), Ok(&spelled));
-    let [of_mt, of_spelled] = [mt, &spelled].map(|mt| stats(mt).expect("a valid MT"));
-    assert_eq!(of_mt.explicit_bytes, of_spelled.explicit_bytes);
-    assert_eq!(
-        (of_mt.arcs, of_mt.depth, of_mt.bounds),
-        (of_spelled.arcs, of_spelled.depth, of_spelled.bounds)
-    );
-    let back = spelled.convert(how.kind).expect("it was one");
-    (back != spelled).then_some(back)
+/// The same MT by way of the explicit one.
+fn by_the_explicit(mt: &Mt) -> Mt {
+    let explicit = ExplicitMt::of(mt).expect("any MT can be spelled out");
+    assert_eq!(ExplicitMt::of(&explicit).as_ref(), Ok(&explicit));
+    let [compact, spelled] = [stats(mt), stats(&explicit)].map(|found| found.expect("a valid MT"));
+    assert_eq!(compact.explicit_bytes, spelled.explicit_bytes);
+    assert_eq!((compact.arcs, compact.depth, compact.bounds), (spelled.arcs, spelled.depth, spelled.bounds));
+    explicit.compact(mt.info().kind).expect("it was one")
 }
 
 fn errors(how: How) {
@@ -543,18 +540,6 @@ fn insertions_that_move_the_boundary_occur_and_are_undone_exactly() {
     }
 }
 
-/// What the builder spells out is what the compact MT makes of it: the two come about in different ways.
-#[test]
-fn the_compact_mt_is_the_one_that_the_builder_spelled_out() {
-    for how in [HALF_EDGE, DELAUNAY, INSERTED] {
-        for subject in subjects(how) {
-            let spelled = How { kind: MtKind::Explicit, ..how };
-            let built = spelled.build(&subject.input.mesh, subject.input.position_bits);
-            assert_eq!(Mt::from(subject.explicit), built, "{how:?}: {}", subject.input.name);
-        }
-    }
-}
-
 /// Of a domain each, larger than what is compared after every step.
 #[test]
 fn larger_mts_in_waves() {
@@ -587,14 +572,52 @@ mod random_splits {
     use crate::support::strategies::plan;
     use tetralod::mesh::TetMesh;
 
-    fn subjects(plan: Plan) -> [Subject; 2] {
-        let edge = Mt::from(build(plan).edge_mt());
-        let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
-        [edge, spelled].map(|mt| {
-            let mesh = TetMesh::default();
-            let name = "random splits";
-            Subject::of(Input { name, mesh, position_bits: None, flat: false, convex: false }, mt)
-        })
+    fn subject(plan: Plan) -> Subject {
+        let mesh = TetMesh::default();
+        let input = Input { name: "random splits", mesh, position_bits: None, flat: false, convex: false };
+        Subject::of(input, build(plan).edge_mt().into())
+    }
+
+    fn down_and_up<M: ApplyUpdates + Clone>(subject: &Subject, mt: M) {
+        let updates = mt.updates();
+        let mut walk = Walk::new(subject, mt);
+        let start = walk.mesh.hash();
+        walk.assert_same();
+        for u in 0..updates {
+            assert_eq!(walk.toggle(u), Applied::Done);
+            walk.assert_same();
+        }
+        assert_eq!(walk.mesh.tet_count(), subject.mt.info().tetrahedra as usize);
+        assert_eq!(walk.mesh.vertex_count(), subject.mt.info().vertices as usize);
+        for u in (0..updates).rev() {
+            assert_eq!(walk.toggle(u), Applied::Done);
+            walk.assert_same();
+        }
+        assert_eq!(walk.mesh.hash(), start);
+        walk.mesh.compact();
+        walk.assert_same();
+    }
+
+    fn at_random<M: ApplyUpdates + Clone>(subject: &Subject, mt: M, steps: usize, mut random: Random) {
+        let mut walk = Walk::new(subject, mt);
+        let mut hashes = HashMap::from([(walk.set.clone(), walk.mesh.hash())]);
+        for _ in 0..if walk.set.is_empty() { 0 } else { steps } {
+            walk.toggle(random.below(walk.set.len()) as u32);
+            if random.once_in(7) {
+                walk.mesh.compact();
+            }
+            walk.assert_same();
+            let hash = walk.mesh.hash();
+            assert_eq!(*hashes.entry(walk.set.clone()).or_insert(hash), hash);
+        }
+        let different: HashSet<u64> = hashes.values().copied().collect();
+        assert_eq!(different.len(), hashes.len(), "two sets have the same hash");
+    }
+
+    fn in_waves<M: ApplyUpdates + Clone>(subject: &Subject, mt: M, mut random: Random) {
+        let mut walk = Walk { compare_every: 80, ..Walk::new(subject, mt) };
+        walk.wander(4000, &mut random);
+        walk.assert_hash_of_the_set();
     }
 
     proptest! {
@@ -603,45 +626,17 @@ mod random_splits {
         /// All updates in their order make the reference mesh, undone from the last one on the base mesh.
         #[test]
         fn straight_down_and_up_again(plan in plan(6, 2, 0..200)) {
-            for subject in subjects(plan) {
-                let mut walk = Walk::new(&subject, subject.mt.clone());
-                let start = walk.mesh.hash();
-                walk.assert_same();
-                for u in 0..subject.mt.updates() {
-                    prop_assert_eq!(walk.toggle(u), Applied::Done);
-                    walk.assert_same();
-                }
-                prop_assert_eq!(walk.mesh.tet_count(), subject.mt.info().tetrahedra as usize);
-                prop_assert_eq!(walk.mesh.vertex_count(), subject.mt.info().vertices as usize);
-                for u in (0..subject.mt.updates()).rev() {
-                    prop_assert_eq!(walk.toggle(u), Applied::Done);
-                    walk.assert_same();
-                }
-                prop_assert_eq!(walk.mesh.hash(), start);
-                walk.mesh.compact();
-                walk.assert_same();
-            }
+            let subject = subject(plan);
+            down_and_up(&subject, subject.mt.clone());
+            down_and_up(&subject, subject.explicit.clone());
         }
 
         /// The hash depends on the set alone, and tells sets apart.
         #[test]
         fn small_meshes_at_random(plan in plan(6, 2, 0..14), steps in 0_usize..600, seed in any::<u64>()) {
-            for subject in subjects(plan) {
-                let mut walk = Walk::new(&subject, subject.mt.clone());
-                let mut random = Random(seed);
-                let mut hashes = HashMap::from([(walk.set.clone(), walk.mesh.hash())]);
-                for _ in 0..if walk.set.is_empty() { 0 } else { steps } {
-                    walk.toggle(random.below(walk.set.len()) as u32);
-                    if random.once_in(7) {
-                        walk.mesh.compact();
-                    }
-                    walk.assert_same();
-                    let hash = walk.mesh.hash();
-                    prop_assert_eq!(*hashes.entry(walk.set.clone()).or_insert(hash), hash);
-                }
-                let different: HashSet<u64> = hashes.values().copied().collect();
-                prop_assert_eq!(different.len(), hashes.len(), "two sets have the same hash");
-            }
+            let subject = subject(plan);
+            at_random(&subject, subject.mt.clone(), steps, Random(seed));
+            at_random(&subject, subject.explicit.clone(), steps, Random(seed));
         }
     }
 
@@ -650,27 +645,21 @@ mod random_splits {
 
         #[test]
         fn large_meshes_in_waves(plan in plan(6, 2, 100..1000), seed in any::<u64>()) {
-            for subject in subjects(plan) {
-                let mut walk = Walk { compare_every: 80, ..Walk::new(&subject, subject.mt.clone()) };
-                walk.wander(4000, &mut Random(seed));
-                walk.assert_hash_of_the_set();
-            }
+            let subject = subject(plan);
+            in_waves(&subject, subject.mt.clone(), Random(seed));
+            in_waves(&subject, subject.explicit.clone(), Random(seed));
         }
 
         #[test]
         fn they_may_arrive_at_any_time(plan in plan(6, 2, 0..300), seed in any::<u64>()) {
-            for subject in subjects(plan) {
-                arrive(&subject, 12, &mut Random(seed));
-            }
+            arrive(&subject(plan), 12, &mut Random(seed));
         }
 
-        /// Turned into the other kind and back, an MT is what it was.
+        /// Spelled out and made compact again, an MT is what it was.
         #[test]
-        fn both_kinds_hold_the_same(plan in plan(5, 2, 0..300)) {
-            let [edge, spelled] = subjects(plan).map(|subject| subject.mt);
-            let back = converted(EDGE, &edge).expect("it is of another kind");
-            prop_assert_eq!(&back, &edge);
-            prop_assert_eq!(converted(EDGE, &spelled), Some(edge));
+        fn the_explicit_mt_holds_the_same(plan in plan(5, 2, 0..300)) {
+            let edge = subject(plan).mt;
+            prop_assert_eq!(by_the_explicit(&edge), edge);
         }
     }
 
@@ -686,11 +675,11 @@ mod random_splits {
                 fields: 1,
                 updates: 9,
             };
-            for subject in subjects(plan) {
-                dependent += subject.ancestors.iter().filter(|above| !above.is_empty()).count();
-                visit_all(&subject, subject.mt.clone(), 0, &mut Random(seed));
-            }
+            let subject = subject(plan);
+            dependent += subject.ancestors.iter().filter(|above| !above.is_empty()).count();
+            visit_all(&subject, subject.mt.clone(), 0, &mut Random(seed));
+            visit_all(&subject, subject.explicit.clone(), 0, &mut Random(seed));
         }
-        assert!(dependent > 100, "the tiny MTs have hardly any dependencies: {dependent}");
+        assert!(dependent > 50, "the tiny MTs have hardly any dependencies: {dependent}");
     }
 }

@@ -51,7 +51,7 @@ fn octahedron(push: impl FnOnce(&mut ExplicitMt)) -> ExplicitMt {
     let mut tets: Vec<[u32; 4]> = ring.map(|[a, b]| [0, a, b, 5]).to_vec();
     tets.extend(ring.map(|[a, b]| [0, b, a, 6]));
     let base = tetralod::mt::BaseMesh { values: vec![0; 7], positions, tets };
-    let mut mt = ExplicitMt::new(tetralod::mt::MtInfo { kind: MtKind::Explicit, ..info }, base);
+    let mut mt = ExplicitMt::new(tetralod::mt::MtInfo { kind: MtKind::Vertex, ..info }, base);
     push(&mut mt);
     mt
 }
@@ -180,7 +180,7 @@ fn parts_may_come_and_go() {
 
 #[test]
 fn what_is_no_split_does_not_become_one() {
-    let to_edge = |mt: ExplicitMt| match Mt::from(mt).convert(MtKind::Edge) {
+    let to_edge = |mt: ExplicitMt| match mt.compact(MtKind::Edge) {
         Err(ConvertError::Update { update, .. }) => update,
         other => panic!("{other:?}"),
     };
@@ -200,9 +200,9 @@ fn what_is_no_split_does_not_become_one() {
             mt.push(&update(&halves, &ALL, &tets)).expect("an update");
         })
     };
-    let good = Mt::from(split([72, 64, 64]));
-    let edge = good.convert(MtKind::Edge).expect("a split");
-    assert_eq!(edge.convert(MtKind::Explicit), Ok(good));
+    let good = split([72, 64, 64]);
+    let edge = good.compact(MtKind::Edge).expect("a split");
+    assert_eq!(ExplicitMt::of(&edge), Ok(good));
     assert_eq!(to_edge(split([74, 64, 64])), 0);
 
     let edge = Mt::from(EdgeMt::new(edge.info().clone(), edge.base().clone()));

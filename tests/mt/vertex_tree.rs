@@ -51,7 +51,7 @@ fn insertion(base: BaseMesh, at: [i32; 3], removed: &[u32], faces: &[[u32; 3]]) 
         star.map(|tet @ [v, a, b, c]| if side(tet) > 0 { tet } else { [v, a, c, b] }).collect();
     let field = FieldInfo { name: "f".into(), bits: 8, step: 1.0 / 255.0, ..FieldInfo::default() };
     let info = MtInfo {
-        kind: MtKind::Explicit,
+        kind: MtKind::Vertex,
         lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: POSITION_BITS },
         fields: vec![field],
         vertices: new + 1,

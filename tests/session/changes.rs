@@ -56,7 +56,7 @@ fn opened(mt: &Mt) -> Session {
 #[test]
 fn copies_follow_a_walk_of_requests_and_steps() {
     let mesh = cube(6, &[hilly, linear]);
-    for kind in MtKind::OF_FILES {
+    for kind in MtKind::ALL {
         let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
         let built = build(&mesh, &config);
         let mut session = opened(&built.expect("a valid mesh").mt);

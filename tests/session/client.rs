@@ -75,7 +75,7 @@ fn requests() -> Vec<Request> {
 
 #[test]
 fn meshes_and_bounds_are_those_of_the_whole_file() {
-    for kind in MtKind::OF_FILES {
+    for kind in MtKind::ALL {
         let file = file(kind);
         let mut whole = Session::new();
         whole.feed(&file).expect("a sound file");
@@ -174,7 +174,7 @@ fn blocks_stay_within_the_memory() {
 
 #[test]
 fn files_that_are_cut_or_damaged_are_told() {
-    for kind in MtKind::OF_FILES {
+    for kind in MtKind::ALL {
         let file = file(kind);
         let all = |bytes: &[u8]| {
             let (source, _) = Counted::new(bytes);

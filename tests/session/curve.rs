@@ -114,7 +114,7 @@ fn files_that_come_in_order_state_their_whole_length() {
 
 #[test]
 fn histograms_are_those_of_the_volume() {
-    for kind in MtKind::OF_FILES {
+    for kind in MtKind::ALL {
         let file = file(kind, 9);
         let mut decoder = Decoder::default();
         // In front of the base mesh.

@@ -56,7 +56,7 @@ fn nothing_is_said_before_there_is_a_mesh() {
 
 #[test]
 fn sizes_are_longest_edges_and_errors_are_within_the_request() {
-    for kind in MtKind::OF_FILES {
+    for kind in MtKind::ALL {
         let mut session = opened(kind);
         let mut largest = f64::INFINITY;
         for error in [0.3, 0.1, 0.02, 0.0] {
@@ -93,7 +93,7 @@ fn the_error_of_one_field_is_shown_where_only_that_is_asked_for() {
 
 #[test]
 fn depths_grow_where_the_mesh_gets_finer() {
-    for kind in MtKind::OF_FILES {
+    for kind in MtKind::ALL {
         let mut session = opened(kind);
         assert!(of(&mut session, TetQuantity::Depth).iter().all(|d| *d == 0.0), "the base mesh");
         let mut random = Random::new(4);
@@ -132,7 +132,7 @@ fn depths_grow_where_the_mesh_gets_finer() {
 
 #[test]
 fn blocks_are_those_of_the_file() {
-    for kind in MtKind::OF_FILES {
+    for kind in MtKind::ALL {
         let mut session = opened(kind);
         assert!(of(&mut session, TetQuantity::Block).iter().all(|b| *b == 0.0), "{kind:?}");
         session.refine(&Request::within(0.0)).expect("a good request");

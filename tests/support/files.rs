@@ -105,7 +105,7 @@ pub fn insertions(tets: u32, fields: usize, updates: usize) -> ExplicitMt {
     let mut next = numbers();
     let n = updates as u32;
     let info = MtInfo {
-        kind: MtKind::Explicit,
+        kind: MtKind::Vertex,
         lattice: Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 28 },
         fields: (0..fields).map(|f| field(["p", "q", "r"][f % 3], 12)).collect(),
         vertices: 4 * tets + n,
@@ -150,13 +150,13 @@ pub fn insertions(tets: u32, fields: usize, updates: usize) -> ExplicitMt {
 
 /// The same as a vertex-based MT.
 pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
-    let mt = Mt::from(insertions(tets, fields, updates)).convert(MtKind::Vertex);
+    let mt = insertions(tets, fields, updates).compact(MtKind::Vertex);
     mt.expect("insertions")
 }
 
 /// The same as a half-edge MT: a vertex in a single tetrahedron collapses onto any of its corners.
 pub fn half_edge(tets: u32, fields: usize, updates: usize) -> Mt {
-    let mt = Mt::from(insertions(tets, fields, updates)).convert(MtKind::HalfEdge);
+    let mt = insertions(tets, fields, updates).compact(MtKind::HalfEdge);
     mt.expect("insertions that collapse onto a corner")
 }
 

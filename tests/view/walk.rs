@@ -17,12 +17,8 @@ pub fn changed<T: PartialEq>(old: &[T], new: &[T]) -> Vec<Range<u32>> {
 }
 
 /// Every kind of MT with a way to build it.
-pub const KINDS: [(MtKind, Method); 4] = [
-    (MtKind::Edge, Method::Collapse),
-    (MtKind::Vertex, Method::Decimate),
-    (MtKind::Vertex, Method::Insert),
-    (MtKind::Explicit, Method::Collapse),
-];
+pub const KINDS: [(MtKind, Method); 3] =
+    [(MtKind::Edge, Method::Collapse), (MtKind::Vertex, Method::Decimate), (MtKind::Vertex, Method::Insert)];
 
 pub struct Walk {
     mt: Mt,

@@ -101,7 +101,7 @@ pub struct BuildOptions {
 
 /// Parses the name of a kind of MT.
 pub fn kind(text: &str) -> Result<MtKind> {
-    named(text, &MtKind::OF_FILES.map(|kind| (kind.name(), kind)))
+    named(text, &MtKind::ALL.map(|kind| (kind.name(), kind)))
 }
 
 /// How finely the values of a field are kept, or of all without a name.

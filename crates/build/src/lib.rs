@@ -76,7 +76,7 @@ pub use result::{BuildResult, BuildSummary};
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{ExplicitMt, Mt, MultiTessellation, UpdateId, UpdatePages, VertexId};
+use tetralod::mt::{ExplicitMt, Mt, MultiTessellation, UpdateId, UpdatePages, VertexId, VertexMt};
 
 /// Builds an MT of `mesh`, which must be valid: see [`tetralod::mesh::repair`]. [`build_with`] can be watched and stopped.
 ///
@@ -130,24 +130,18 @@ pub fn build_with<'a>(
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
     let mut mesh = mesh.into();
-    let kind = config.construction.kind();
     restrict::restrictions::check(config)?;
     let result = match config.construction {
-        Construction::Edge | Construction::ExplicitEdge => {
+        Construction::Edge => {
             let BuildResult { mt, summary, vertices, exact } = edge_mt(&mesh, config, progress)?;
             BuildResult { mt: Mt::from(mt), summary, vertices, exact }
         }
         Construction::HalfEdge { purpose } => half_edge_mt(&mut mesh, config, purpose, progress)?,
-        Construction::Vertex(method) | Construction::ExplicitVertex(method) => {
-            summed_up(&mesh, config, vertex::mt_by(method, &mesh, config, progress)?)?
+        Construction::Vertex(method) => {
+            vertex_mt(&mesh, config, vertex::mt_by(method, &mesh, config, progress)?)?
         }
     };
-    // Conversions keep the numbers of the vertices.
-    let mt = match result.mt.info().kind == kind {
-        true => result.mt,
-        false => result.mt.convert(kind)?,
-    };
-    let bits = config.block_bits.clamp(4, 16);
+    let (mt, bits) = (result.mt, config.block_bits.clamp(4, 16));
     let mt = if mt.page_bits() == bits { mt } else { mt.in_pages(bits).map_err(BuildError::Internal)? };
     Ok(BuildResult { mt, ..result })
 }
@@ -169,8 +163,8 @@ fn half_edge_mt(
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
 
-/// Adds the summary of an explicit MT.
-fn summed_up(
+/// The vertex-based MT of the same updates as an explicit one, which has the same numbers of vertices.
+fn vertex_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
     (mt, vertices, interface_deviation): (ExplicitMt, Vec<VertexId>, f64),
@@ -192,5 +186,5 @@ fn summed_up(
         interface_deviation,
     };
     let exact = lattice::field_selection::exact_values(mesh, config, &vertices)?;
-    Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
+    Ok(BuildResult { mt: VertexMt::from_explicit(&mt)?.into(), summary, vertices, exact })
 }

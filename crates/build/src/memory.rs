@@ -9,7 +9,6 @@ use tetralod::mt::MtKind;
 fn bytes_a_tetrahedron(construction: Construction) -> u64 {
     match (construction.method(), construction.kind()) {
         (Method::Insert, _) => 680,
-        (Method::Collapse, MtKind::Explicit) => 800,
         (Method::Collapse, _) => 340,
         (Method::Decimate, MtKind::HalfEdge) => 180,
         (Method::Decimate, _) => 620,

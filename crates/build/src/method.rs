@@ -112,10 +112,6 @@ pub enum Construction {
     },
     /// A vertex-based MT.
     Vertex(VertexMethod),
-    /// An explicit MT of the updates of an edge-based one.
-    ExplicitEdge,
-    /// An explicit MT of the updates of a vertex-based one.
-    ExplicitVertex(VertexMethod),
 }
 
 /// How the updates of a vertex-based MT are built.
@@ -213,7 +209,6 @@ impl Construction {
             MtKind::Vertex => {
                 Self::Vertex(VertexMethod::Decimate { criterion: BuildCriterion::HalfEdge, purpose })
             }
-            MtKind::Explicit => Self::ExplicitEdge,
         }
     }
 
@@ -230,12 +225,10 @@ impl Construction {
         };
         match (kind, method, by_vertices) {
             (MtKind::Edge, Method::Collapse, _) => Ok(Self::Edge),
-            (MtKind::Explicit, Method::Collapse, _) => Ok(Self::ExplicitEdge),
             (MtKind::HalfEdge, Method::Decimate, _) if criterion == BuildCriterion::HalfEdge => {
                 Ok(Self::HalfEdge { purpose })
             }
             (MtKind::Vertex, _, Some(method)) => Ok(Self::Vertex(method)),
-            (MtKind::Explicit, _, Some(method)) => Ok(Self::ExplicitVertex(method)),
             _ => Err(contradiction(kind, method, criterion)),
         }
     }
@@ -249,9 +242,6 @@ impl Construction {
             Self::HalfEdge { .. } => Ok(Self::HalfEdge { purpose }),
             Self::Vertex(VertexMethod::Decimate { criterion, .. }) => {
                 Ok(Self::Vertex(VertexMethod::Decimate { criterion, purpose }))
-            }
-            Self::ExplicitVertex(VertexMethod::Decimate { criterion, .. }) => {
-                Ok(Self::ExplicitVertex(VertexMethod::Decimate { criterion, purpose }))
             }
             _ => Err(BuildError::Combination {
                 which: ["a purpose".to_owned(), self.method().described()],
@@ -268,7 +258,6 @@ impl Construction {
         let method = VertexMethod::Insert { tet_errors: true };
         match self {
             Self::Vertex(VertexMethod::Insert { .. }) => Ok(Self::Vertex(method)),
-            Self::ExplicitVertex(VertexMethod::Insert { .. }) => Ok(Self::ExplicitVertex(method)),
             _ => Err(BuildError::Combination {
                 which: ["tet errors".to_owned(), self.method().described()],
                 instead: "errors of tetrahedra by themselves go with method insert; by the other methods they hardly \
@@ -283,16 +272,15 @@ impl Construction {
             Self::Edge => MtKind::Edge,
             Self::HalfEdge { .. } => MtKind::HalfEdge,
             Self::Vertex(_) => MtKind::Vertex,
-            Self::ExplicitEdge | Self::ExplicitVertex(_) => MtKind::Explicit,
         }
     }
 
     /// How it is built.
     pub fn method(self) -> Method {
         match self {
-            Self::Edge | Self::ExplicitEdge => Method::Collapse,
+            Self::Edge => Method::Collapse,
             Self::HalfEdge { .. } => Method::Decimate,
-            Self::Vertex(method) | Self::ExplicitVertex(method) => match method {
+            Self::Vertex(method) => match method {
                 VertexMethod::Insert { .. } => Method::Insert,
                 VertexMethod::Decimate { .. } => Method::Decimate,
             },
@@ -302,9 +290,9 @@ impl Construction {
     /// By what criterion vertices are removed or inserted; none for [`Method::Collapse`].
     pub fn criterion(self) -> Option<BuildCriterion> {
         match self {
-            Self::Edge | Self::ExplicitEdge => None,
+            Self::Edge => None,
             Self::HalfEdge { .. } => Some(BuildCriterion::HalfEdge),
-            Self::Vertex(method) | Self::ExplicitVertex(method) => Some(match method {
+            Self::Vertex(method) => Some(match method {
                 VertexMethod::Insert { .. } => BuildCriterion::Delaunay,
                 VertexMethod::Decimate { criterion, .. } => criterion,
             }),
@@ -333,7 +321,7 @@ fn contradiction(kind: MtKind, method: Method, criterion: BuildCriterion) -> Bui
             [of_kind, by_criterion],
             "MTs of kind half-edge are built with criterion half-edge; criterion delaunay builds kind vertex",
         ),
-        (MtKind::Vertex | MtKind::Explicit, _) => (
+        (MtKind::Vertex, _) => (
             [method.described(), by_criterion],
             "method insert has criterion delaunay; criterion half-edge goes with method decimate",
         ),

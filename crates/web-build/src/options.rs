@@ -67,7 +67,7 @@ pub fn build_options(options: &JsValue) -> Result<BuildOptions, WebError> {
 
 fn choice(given: &Given) -> Result<ConstructionChoice, ReadError> {
     Ok(ConstructionChoice {
-        kind: given.name("kind", &MtKind::OF_FILES.map(|kind| (kind.name(), kind)))?,
+        kind: given.name("kind", &MtKind::ALL.map(|kind| (kind.name(), kind)))?,
         method: given.name("method", &Method::ALL.map(|method| (method.name(), method)))?,
         criterion: given.name("criterion", &BuildCriterion::ALL.map(|by| (by.name(), by)))?,
         purpose: given.name("purpose", &Purpose::ALL.map(|purpose| (purpose.name(), purpose)))?,

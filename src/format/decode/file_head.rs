@@ -42,7 +42,7 @@ impl FileHead {
 
     /// The codec of the kind of MT, once the description is there.
     pub(super) fn codec(&self) -> Option<&'static KindCodec> {
-        codec_of(self.info.as_ref()?.kind)
+        Some(codec_of(self.info.as_ref()?.kind))
     }
 
     /// Whether all is here that stands in front of histograms: the description, and the index where there is one.

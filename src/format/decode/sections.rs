@@ -55,9 +55,7 @@ impl Decoder {
         }
         let offset = self.bytes;
         let (info, metadata) = payload::read_info(content)?;
-        let Some(codec) = codec_of(info.kind) else {
-            return Err(FormatError::Corrupt { offset, what: "the kind of MT is not known" });
-        };
+        let codec = codec_of(info.kind);
         if self.head.start.tet_errors && !codec.has_tet_errors {
             let what = "errors of tetrahedra in an MT of a kind that has none";
             return Err(FormatError::UnsupportedFeature { offset, what });

@@ -27,8 +27,7 @@ pub fn write_info(
     if !metadata.iter().all(|(key, value)| fits(key) && fits(value)) {
         return Err(EncodeError::TooLong { what: "a metadata key or value" });
     }
-    let number = number_of(info.kind).ok_or(EncodeError::Kind { kind: info.kind })?;
-    out.push(number);
+    out.push(number_of(info.kind));
     for count in [info.vertices, info.tetrahedra, info.updates] {
         write::u32(out, count);
     }

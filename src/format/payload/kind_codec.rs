@@ -42,21 +42,25 @@ impl KindCodec {
     }
 }
 
-/// Of all kinds that files have.
+/// Of all kinds.
 pub static CODECS: [KindCodec; 3] =
     [KindCodec::of::<EdgeMt>(), KindCodec::of::<VertexMt>(), KindCodec::of::<HalfEdgeMt>()];
 
-/// The number of a kind in files; none of one that no file has. Asked for the codec, whoever writes would have what reads all kinds, too.
-pub fn number_of(kind: MtKind) -> Option<u8> {
-    const NUMBERS: [(MtKind, u8); 3] = [
-        (EdgeMt::KIND, EdgeMt::NUMBER),
-        (VertexMt::KIND, VertexMt::NUMBER),
-        (HalfEdgeMt::KIND, HalfEdgeMt::NUMBER),
-    ];
-    NUMBERS.iter().find(|(known, _)| *known == kind).map(|(_, number)| *number)
+/// The number of a kind in files. Asked for the codec, whoever writes would have what reads all kinds, too.
+pub fn number_of(kind: MtKind) -> u8 {
+    match kind {
+        MtKind::Edge => EdgeMt::NUMBER,
+        MtKind::Vertex => VertexMt::NUMBER,
+        MtKind::HalfEdge => HalfEdgeMt::NUMBER,
+    }
 }
 
-/// The codec of a kind; none of one that no file has.
-pub fn codec_of(kind: MtKind) -> Option<&'static KindCodec> {
-    CODECS.iter().find(|codec| codec.kind == kind)
+/// The codec of a kind.
+pub fn codec_of(kind: MtKind) -> &'static KindCodec {
+    let [edge, vertex, half_edge] = &CODECS;
+    match kind {
+        MtKind::Edge => edge,
+        MtKind::Vertex => vertex,
+        MtKind::HalfEdge => half_edge,
+    }
 }

@@ -13,8 +13,8 @@ use crate::mt::pages::Rows;
 use crate::mt::replay::{ReplayError, canonical, replay};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
-    ApplyUpdates, BaseMesh, ErrorCode, MAX_QUARTERINGS, MtInfo, MtKind, MultiTessellation, UpdateError,
-    UpdateId, VertexId,
+    ApplyUpdates, BaseMesh, ErrorCode, MAX_QUARTERINGS, MtInfo, MultiTessellation, UpdateError, UpdateId,
+    VertexId,
 };
 use std::collections::HashMap;
 use std::ops::Range;
@@ -35,7 +35,7 @@ pub struct ExplicitUpdate<'a> {
     pub errors: &'a [ErrorCode],
 }
 
-/// An explicit MT.
+/// An explicit MT. [`MtInfo::kind`] is that of the compact MT with the same updates, as far as there is one.
 ///
 /// It grows by [`push`](ExplicitMt::push), coarse to fine; every prefix of an MT is an MT.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,8 +90,7 @@ pub(in crate::mt) const MAX_TETS: usize = 1 << 31;
 
 impl ExplicitMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`].
-    pub fn new(mut info: MtInfo, base: BaseMesh) -> Self {
-        info.kind = MtKind::Explicit;
+    pub fn new(info: MtInfo, base: BaseMesh) -> Self {
         let base_tets = base.tets.len();
         let errors = Errors::new(info.fields.len());
         Self {
@@ -435,7 +434,7 @@ impl MultiTessellation for ExplicitMt {
 mod tests {
     use super::*;
     use crate::geom::Lattice;
-    use crate::mt::{EdgeMtBuilder, FieldInfo, MtFault, VertexSplit};
+    use crate::mt::{EdgeMtBuilder, FieldInfo, MtFault, MtKind, VertexSplit};
 
     /// An octahedron around a vertex that is split along z and whose upper half is split along x.
     fn twice_split() -> ExplicitMt {

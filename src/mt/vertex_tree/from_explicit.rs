@@ -222,7 +222,7 @@ mod tests {
         let tets = vec![[0, 2, 3, 1], [0, 3, 4, 1], [0, 4, 2, 1]];
         let field = FieldInfo { name: "f".into(), bits: 8, ..FieldInfo::default() };
         let info = MtInfo {
-            kind: MtKind::Explicit,
+            kind: MtKind::Vertex,
             lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 8 },
             fields: vec![field],
             vertices: 6,

@@ -1,5 +1,4 @@
-//! MTs of every kind by every builder, and what must be true of a mesh of theirs: the oracle is the explicit MT, spelled
-//! out by the builder where there is such a way, and used as plain lists of tetrahedra only.
+//! MTs of every kind by every builder, and what must be true of a mesh of theirs: the oracle is the explicit MT, used as plain lists of tetrahedra only.
 
 pub mod deviation;
 
@@ -10,8 +9,8 @@ use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{
-    ApplyUpdates, CurrentMesh, EdgeMt, ExplicitMt, ExplicitUpdate, HalfEdgeMt, Mt, MtKind, MultiTessellation,
-    UpdateId, UpdatePages, VertexId, VertexMt, stats,
+    ApplyUpdates, CurrentMesh, EdgeMt, ExplicitMt, HalfEdgeMt, Mt, MtKind, MultiTessellation, UpdateId,
+    UpdatePages, VertexId, VertexMt, stats,
 };
 use tetralod_build::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 
@@ -25,12 +24,10 @@ pub struct How {
 
 pub const EDGE: How =
     How { kind: MtKind::Edge, method: Method::Collapse, criterion: BuildCriterion::HalfEdge };
-pub const SPELLED_EDGE: How = How { kind: MtKind::Explicit, ..EDGE };
 pub const HALF_EDGE: How = How { kind: MtKind::Vertex, method: Method::Decimate, ..EDGE };
 pub const DELAUNAY: How = How { criterion: BuildCriterion::Delaunay, ..HALF_EDGE };
 pub const INSERTED: How = How { method: Method::Insert, ..DELAUNAY };
 pub const PAGED: How = How { kind: MtKind::HalfEdge, ..HALF_EDGE };
-pub const SPELLED_VERTEX: How = How { kind: MtKind::Explicit, ..HALF_EDGE };
 
 impl How {
     /// Insertion fills the convex hull of the points, so it has nothing else to offer for other domains.
@@ -275,7 +272,6 @@ pub fn empty(mt: &Mt) -> Mt {
             let marks = mt.base_marks().to_vec();
             HalfEdgeMt::new(info, base, marks, &children, mt.page_bits()).expect("the same base mesh").into()
         }
-        Mt::Explicit(_) => ExplicitMt::new(info, base).into(),
         _ => unreachable!("there are no others"),
     }
 }
@@ -287,19 +283,6 @@ pub fn grow(part: &mut Mt, whole: &Mt) {
         (Mt::Edge(part), Mt::Edge(whole)) => part.push(&whole.update(u)),
         (Mt::Vertex(part), Mt::Vertex(whole)) => part.push(&whole.node(u), whole.errors(u)),
         (Mt::HalfEdge(part), Mt::HalfEdge(whole)) => part.push(&whole.update(u).expect("an update")),
-        (Mt::Explicit(part), Mt::Explicit(whole)) => {
-            let created = whole.created(u).map(VertexId);
-            let positions: Vec<[i32; 3]> = created.clone().map(|v| whole.position(v)).collect();
-            let levels: Vec<i32> = created.flat_map(|v| whole.levels(v).to_vec()).collect();
-            let range = whole.inserted(u);
-            part.push(&ExplicitUpdate {
-                positions: &positions,
-                levels: &levels,
-                removed: whole.removed(u),
-                inserted: &whole.tets()[range.start as usize..range.end as usize],
-                errors: whole.errors(u),
-            })
-        }
         _ => panic!("two kinds"),
     };
     assert_eq!(pushed, Ok(u));

@@ -8,7 +8,8 @@ use crate::lattice::location::Location;
 use crate::lattice::places::Places;
 use crate::lattice::quantize;
 use crate::order::reach::Reach;
-use crate::{BuildConfig, BuildError, Construction, OnProgress, Purpose};
+use crate::vertex::mt_by;
+use crate::{BuildConfig, BuildError, Construction, OnProgress, Purpose, VertexMethod};
 use glam::{DMat3, DVec3};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,7 +18,7 @@ use std::sync::atomic::Ordering;
 use tetralod::geom::{in_conflict, nearest_on_triangle, orient3d};
 use tetralod::mesh::{EDGES, FACES, Field, Grid, NONE, TetMesh, repair, topology};
 use tetralod::mt::{
-    ErrorCode, ExplicitMt, HalfEdgeMt, MAX_LINK, MtKind, MultiTessellation, UpdateId, VertexId,
+    ErrorCode, ExplicitMt, HalfEdgeMt, MAX_LINK, MtKind, MultiTessellation, UpdateId, VertexId, VertexMt,
 };
 
 const CRITERIA: [BuildCriterion; 2] = [BuildCriterion::HalfEdge, BuildCriterion::Delaunay];
@@ -610,6 +611,27 @@ fn collapses_make_the_updates_of_the_explicit_structure() {
             let mut depths = Vec::new();
             (0..own.updates()).for_each(|u| depths.push(depth(u, &depths)));
             assert_eq!(Some(built.summary.depth), depths.into_iter().max().or(Some(0)), "{name}");
+        }
+    }
+}
+
+/// What a vertex-based MT says by its nodes is what the builder spelled out.
+#[test]
+fn vertex_based_mts_have_the_updates_of_the_explicit_one() {
+    let mut ways: Vec<VertexMethod> =
+        WAYS.iter().map(|&(criterion, purpose)| VertexMethod::Decimate { criterion, purpose }).collect();
+    ways.extend([false, true].map(|tet_errors| VertexMethod::Insert { tet_errors }));
+    for (name, mesh) in domains() {
+        let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
+        let config = BuildConfig { fields, ..BuildConfig::of(MtKind::Vertex) };
+        for &way in &ways {
+            // Insertion fills the convex hull.
+            let points = TetMesh { tets: Vec::new(), ..mesh.clone() };
+            let input = if matches!(way, VertexMethod::Insert { .. }) { &points } else { &mesh };
+            let (explicit, ..) = mt_by(way, input, &config, &mut |_| ControlFlow::Continue(()))
+                .unwrap_or_else(|error| panic!("{name}, {way:?}: {error}"));
+            let compact = VertexMt::from_explicit(&explicit).expect("insertions");
+            assert!(ExplicitMt::of(&compact) == Ok(explicit), "{name}, {way:?}");
         }
     }
 }

@@ -56,7 +56,7 @@ impl Quantized {
     /// displacement that count as an error of 1.
     pub fn info(&self, tetrahedra: usize, displacement_per_error: f64) -> MtInfo {
         MtInfo {
-            kind: MtKind::Explicit,
+            kind: MtKind::Vertex,
             lattice: self.lattice,
             fields: self.fields.clone(),
             vertices: self.positions.len() as u32,

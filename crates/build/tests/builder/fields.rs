@@ -15,15 +15,11 @@ use tetralod_build::{
 };
 
 /// Every kind with every way to build it.
-const WAYS: [(MtKind, Method, BuildCriterion); 8] = [
+const WAYS: [(MtKind, Method, BuildCriterion); 4] = [
     (MtKind::Edge, Method::Collapse, BuildCriterion::HalfEdge),
-    (MtKind::Explicit, Method::Collapse, BuildCriterion::HalfEdge),
     (MtKind::Vertex, Method::Decimate, BuildCriterion::HalfEdge),
     (MtKind::Vertex, Method::Decimate, BuildCriterion::Delaunay),
-    (MtKind::Explicit, Method::Decimate, BuildCriterion::HalfEdge),
     (MtKind::Vertex, Method::Insert, BuildCriterion::Delaunay),
-    (MtKind::Explicit, Method::Insert, BuildCriterion::Delaunay),
-    (MtKind::Explicit, Method::Decimate, BuildCriterion::Delaunay),
 ];
 
 fn try_build(mesh: &TetMesh, config: &BuildConfig) -> Result<BuildResult, BuildError> {
@@ -95,9 +91,6 @@ fn exact_values_come_back_at_every_point_of_every_kind() {
         for table in &exact {
             assert!(table.vertices.is_sorted() && table.vertices.len() == points, "{what}");
             assert!(ids.iter().all(|&id| full.slot(id).is_none() || table.get(id).is_some()), "{what}");
-        }
-        if kind == MtKind::Explicit {
-            continue;
         }
         // And they come back from a file.
         let file = encode(&mt, &EncodeOptions { exact, ..EncodeOptions::default() }).expect("a sound MT");

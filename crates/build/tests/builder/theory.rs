@@ -149,7 +149,7 @@ fn a_larger_budget_is_never_worse() {
 
 #[test]
 fn errors_fall_and_are_never_zero() {
-    for kind in MtKind::OF_FILES.into_iter().chain([MtKind::Explicit]) {
+    for kind in MtKind::ALL {
         let config = BuildConfig::of(kind);
         let built = build(&cube(5, &[|_| 7.0]), &config);
         let mt = built.expect("a valid mesh").mt;

@@ -129,7 +129,6 @@ fn configs() -> Vec<(&'static str, BuildConfig)> {
         ("edge", BuildConfig::of(MtKind::Edge)),
         ("vertex", BuildConfig::of(MtKind::Vertex)),
         ("delaunay", by(MtKind::Vertex, Method::Decimate, BuildCriterion::Delaunay)),
-        ("explicit", BuildConfig::of(MtKind::Explicit)),
     ]
 }
 

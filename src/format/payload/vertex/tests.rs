@@ -11,7 +11,7 @@ use crate::mt::{CurrentMesh, ErrorCode, ExplicitMt, ExplicitUpdate, FieldInfo, M
 fn info() -> MtInfo {
     let field = FieldInfo { max: 255.0, step: 1.0, bits: 8, ..FieldInfo::default() };
     MtInfo {
-        kind: MtKind::Explicit,
+        kind: MtKind::Vertex,
         lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 6 },
         fields: vec![field.clone(), field],
         vertices: 0,
