@@ -13,6 +13,10 @@ pub(super) struct Blocks {
     pub memory: u64,
     /// How far the file has been read in order.
     pub fed: u64,
+    /// Bytes that have come, those that came again counted again.
+    pub fetched: u64,
+    /// What has come, in ascending order; no two of these meet.
+    pub arrived: Vec<Range<u64>>,
     /// What has come of blocks that are not complete, by where it begins.
     pub pieces: Pieces,
     /// The beginning of a range of a block, and where that begins: it came with what stands in front of the blocks.
@@ -36,6 +40,8 @@ impl Blocks {
         Self {
             memory,
             fed: 0,
+            fetched: 0,
+            arrived: Vec::new(),
             pieces: Pieces::default(),
             beginning: None,
             waiting: Pieces::default(),
@@ -46,6 +52,25 @@ impl Blocks {
             plans: 0,
             criterion: None,
         }
+    }
+
+    /// Notes that so many bytes have come from `start` on.
+    pub fn arrive(&mut self, start: u64, bytes: usize) {
+        if bytes == 0 {
+            return;
+        }
+        self.fetched += bytes as u64;
+        let new = start..start.saturating_add(bytes as u64);
+        let first = self.arrived.partition_point(|range| range.end < new.start);
+        let behind = self.arrived.partition_point(|range| range.start <= new.end);
+        let meets = self.arrived[first..behind].iter();
+        let whole = meets.fold(new, |whole, range| whole.start.min(range.start)..whole.end.max(range.end));
+        self.arrived.splice(first..behind, [whole]);
+    }
+
+    /// Bytes that have come, each counted once.
+    pub fn arrived_bytes(&self) -> u64 {
+        self.arrived.iter().map(|range| range.end - range.start).sum()
     }
 
     /// Bytes of what waits to be put together.
@@ -83,5 +108,22 @@ impl Blocks {
                 self.beginning = Some((range.start, come));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_that_come_again_are_counted_once() {
+        let mut blocks = Blocks::new(0);
+        for (start, bytes, arrived) in
+            [(10, 5, 5), (0, 2, 7), (12, 8, 12), (2, 8, 20), (0, 20, 20), (30, 0, 20), (29, 3, 23)]
+        {
+            blocks.arrive(start, bytes);
+            assert_eq!(blocks.arrived_bytes(), arrived, "{start} {bytes}");
+        }
+        assert_eq!(blocks.fetched, 46);
     }
 }

@@ -6,21 +6,13 @@
 
 use super::Session;
 use super::block_state::Blocks;
-use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
+use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index};
 use crate::geom::Bounds;
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front};
+use crate::stream::{Loader, WantedRange};
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Bytes of a file that are wanted.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WantedBytes {
-    /// Which ones. They may reach beyond the end of the file.
-    pub range: Range<u64>,
-    /// How much: the more the block lowers the excess of the error for each of its bytes, the higher.
-    pub priority: f64,
-}
 
 /// How a session that keeps blocks stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,22 +63,24 @@ impl Session {
         Self { decoder, blocks: Some(Blocks::new(memory)), ..Self::default() }
     }
 
-    /// Which bytes of the file are wanted next, most important first; none when all is here that the request needs. Only for
-    /// sessions [in parts](Session::in_parts).
-    pub fn wanted(&self) -> Vec<WantedBytes> {
+    /// Which bytes of the file are wanted next, most important first: the more a block lowers the excess of the error for each of
+    /// its bytes. They may reach beyond the end of the file. None when all is here that the request needs. Only for sessions
+    /// [in parts](Session::in_parts).
+    pub fn wanted(&self) -> Vec<WantedRange> {
         let Some(blocks) = &self.blocks else { return Vec::new() };
         if let Some(end) = self.head_missing(blocks) {
-            return vec![WantedBytes { range: blocks.fed..end, priority: f64::MAX }];
+            return vec![WantedRange { range: blocks.fed..end, priority: f32::INFINITY }];
         }
         let Some(mt) = self.decoder.mt().filter(|mt| mt.is_paged()) else { return Vec::new() };
         let mut wanted = Vec::new();
         for &(priority, block) in &blocks.plan {
+            let priority = priority as f32;
             if mt.has_page(block) || blocks.waiting.has(block.into()) {
                 continue;
             }
             let ranges = self.decoder.block_ranges(block).into_iter();
             let missing = ranges.filter(|range| !blocks.pieces.has(range.start));
-            wanted.extend(missing.map(|range| WantedBytes { range: blocks.rest_of(range), priority }));
+            wanted.extend(missing.map(|range| WantedRange { range: blocks.rest_of(range), priority }));
         }
         wanted
     }
@@ -127,13 +121,55 @@ impl Session {
         if self.blocks.is_some() { !self.wanted().is_empty() } else { !self.progress().complete }
     }
 
-    /// Takes in bytes that were [wanted](Session::wanted): exactly one of the ranges, or less of it at the end of the file.
+    /// Bytes of the file that have come, those that came again counted again.
+    pub fn fetched(&self) -> u64 {
+        self.blocks.as_ref().map_or_else(|| self.decoder.progress().bytes, |blocks| blocks.fetched)
+    }
+
+    /// Bytes of the file that have come, each counted once: never more than it has.
+    pub fn arrived(&self) -> u64 {
+        self.blocks.as_ref().map_or_else(|| self.decoder.progress().bytes, Blocks::arrived_bytes)
+    }
+
+    /// Takes in a range that was [wanted](Session::wanted), with its bytes: fewer where it reaches beyond the end of the file.
     /// Bytes that are not wanted any more are ignored.
     ///
     /// # Errors
-    /// When the bytes are damaged. What was there before stays usable.
-    pub fn take(&mut self, start: u64, bytes: &[u8]) -> Result<Progress, FormatError> {
-        let Some(blocks) = &self.blocks else { return Ok(self.progress()) };
+    /// If the bytes are damaged, or end where more is needed. What was there before stays usable.
+    pub fn take(&mut self, range: &Range<u64>, bytes: &[u8]) -> Result<(), FormatError> {
+        let Some(blocks) = &mut self.blocks else { return Ok(()) };
+        blocks.arrive(range.start, bytes.len());
+        self.take_from(range.start, bytes)?;
+        let is_short = (bytes.len() as u64) < range.end - range.start;
+        // At the end of a sound file nothing more is wanted.
+        if is_short && self.wanted().iter().any(|wanted| wanted.range.start == range.start) {
+            return Err(FormatError::Truncated { offset: range.start + bytes.len() as u64 });
+        }
+        Ok(())
+    }
+
+    /// Takes all complete ranges of `loader`, and gives it those that are wanted then; whether there was any.
+    ///
+    /// # Errors
+    /// As [`Session::take`]; nothing is wanted then until the next call.
+    pub fn supply(&mut self, loader: &mut Loader) -> Result<bool, FormatError> {
+        let mut any = false;
+        loop {
+            while let Some((range, bytes)) = loader.take() {
+                any = true;
+                // What else has come may be as damaged.
+                self.take(&range, &bytes).inspect_err(|_| loader.drop_all())?;
+            }
+            loader.want(&self.wanted());
+            // What is held for other ranges may make new ones complete.
+            if !loader.has_complete() {
+                return Ok(any);
+            }
+        }
+    }
+
+    fn take_from(&mut self, start: u64, bytes: &[u8]) -> Result<(), FormatError> {
+        let Some(blocks) = &self.blocks else { return Ok(()) };
         if self.head_missing(blocks).is_some() {
             if start == blocks.fed {
                 let end = start + bytes.len() as u64;
@@ -146,17 +182,17 @@ impl Session {
                 self.plan();
                 self.take_surplus(start, bytes)?;
             }
-            return Ok(self.progress());
+            return Ok(());
         }
         let (start, bytes) = blocks.with_beginning(start, bytes);
-        let Some(block) = self.decoder.block_at(start) else { return Ok(self.progress()) };
+        let Some(block) = self.decoder.block_at(start) else { return Ok(()) };
         let ranges = self.decoder.block_ranges(block);
         let fits = ranges.iter().any(|range| range.start == start && range.end - start == bytes.len() as u64);
         let is_here = self.decoder.mt().is_some_and(|mt| mt.has_page(block));
         if !fits || is_here {
-            return Ok(self.progress());
+            return Ok(());
         }
-        let Some(blocks) = &mut self.blocks else { return Ok(self.progress()) };
+        let Some(blocks) = &mut self.blocks else { return Ok(()) };
         blocks.pieces.insert(start, bytes.to_vec());
         blocks.beginning.take_if(|(at, _)| *at == start);
         if ranges.iter().all(|range| blocks.pieces.has(range.start)) {
@@ -165,7 +201,7 @@ impl Session {
             blocks.waiting.insert(block.into(), parts.concat());
             self.insert_waiting()?;
         }
-        Ok(self.progress())
+        Ok(())
     }
 
     /// Whole blocks may have come with what stands in front of them.
