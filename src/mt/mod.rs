@@ -95,6 +95,7 @@ pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
 #[doc(hidden)]
 pub use replay::ReplayError;
+pub(crate) use replay::apply_next;
 #[doc(hidden)]
 pub use replay::canonical;
 #[doc(hidden)]

@@ -186,27 +186,17 @@ pub trait ApplyUpdates: UpdatePages {
     /// The update that created tetrahedron `t` of the current mesh in refinement; none if it is of the base mesh.
     fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId>;
 
-    /// Appends the tetrahedra that `u+` removes from a mesh that contains all parents of `u`, but not `u`.
+    /// The tetrahedra that `u+` removes from a mesh that contains all parents of `u`, but not `u`.
     ///
     /// # Errors
     /// If the MT is damaged, or the mesh is another one.
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError>;
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError>;
 
-    /// Appends the tetrahedra that `u+` inserted into a mesh that contains `u` and none of its children.
+    /// The tetrahedra that `u+` inserted into a mesh that contains `u` and none of its children.
     ///
     /// # Errors
     /// If the MT is damaged, or the mesh is another one.
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError>;
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError>;
 
     /// Whether all that `u+` created is still in the mesh, as far as its labels show.
     /// False means that some child of `u` is applied, or `u` is not.

@@ -37,7 +37,7 @@ pub use quantity::TetQuantity;
 #[doc(hidden)]
 pub use reading::Reading;
 
-use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError, Limits};
+use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError};
 use crate::geom::Bounds;
 use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTessellation};
 use crate::refine::{
@@ -117,11 +117,6 @@ impl Session {
     /// A session that waits for the first byte of a file.
     pub fn new() -> Self {
         Self::default()
-    }
-
-    /// [`Session::new`] with other limits than the default ones.
-    pub fn with_limits(limits: Limits) -> Self {
-        Self::with_options(DecodeOptions { limits, ..DecodeOptions::default() })
     }
 
     /// [`Session::new`] with other options than the default ones.

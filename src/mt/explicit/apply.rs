@@ -275,24 +275,12 @@ impl ApplyUpdates for ExplicitMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        found.extend(Self::slots(mesh, u.0, self.removed(u).iter().copied())?);
-        Ok(())
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+        Self::slots(mesh, u.0, self.removed(u).iter().copied())
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        found.extend(Self::slots(mesh, u.0, self.inserted(u))?);
-        Ok(())
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+        Self::slots(mesh, u.0, self.inserted(u))
     }
 }
 

@@ -41,10 +41,6 @@ impl KindState for State {
     }
 }
 
-fn take_state(mesh: &mut CurrentMesh) -> Box<State> {
-    mesh.take_kind_state().unwrap_or_default()
-}
-
 /// How far to go to name an update that has to come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Search {
@@ -53,9 +49,6 @@ enum Search {
     /// Through all updates before, which takes as long as applying them.
     Everywhere,
 }
-
-/// A tetrahedron at a vertex, and which of its corners that is.
-type AtVertex = (u32, usize);
 
 impl HalfEdgeMt {
     /// Collects T_u, or returns what has to be applied first.
@@ -98,17 +91,17 @@ impl HalfEdgeMt {
         slot: u32,
         search: Search,
     ) -> Result<Result<u32, UpdateId>, UpdateError> {
-        let star = mesh.all_around(slot);
-        if let Some(&(t, _)) = star.iter().find(|&&(t, _)| mesh.tag(t) == u.0) {
+        let mut star = Vec::new();
+        mesh.list_star(slot, &mut star);
+        if let Some(&t) = star.iter().find(|&&t| mesh.tag(t) == u.0) {
             return Ok(Ok(t));
         }
         let torn = UpdateError::Cavity { update: u.0 };
         let near = self.near(u).ok_or(torn.clone())?;
         let child = self.children_of(near).iter().find(|child| child.update == u.0).ok_or(torn.clone())?;
         // T_u will hold the direction in which the new vertex lies, if the domain does: what does so now has to go first.
-        let before = |&&(t, _): &&AtVertex| mesh.tag(t) < u.0;
-        let mut holding = star.iter().filter(|&&(t, at)| mesh.holds(t, at, child.offset));
-        if let Some(&(t, _)) = holding.find(before) {
+        let mut holding = star.into_iter().filter(|&t| mesh.holds(t, slot, child.offset));
+        if let Some(t) = holding.find(|&t| mesh.tag(t) < u.0) {
             return Ok(Err(UpdateId(mesh.tag(t))));
         }
         match search {
@@ -405,26 +398,9 @@ impl CurrentMesh {
         Ok(Applied::Done)
     }
 
-    /// All tetrahedra around the vertex in `slot`, however many, each with the corner that it is.
-    pub(super) fn all_around(&mut self, slot: u32) -> Vec<AtVertex> {
-        self.next_epoch();
-        let first = self.incident[slot as usize];
-        let mut star = vec![(first, corner_of(&self.tets[first as usize], slot))];
-        self.number_tet(first, 0);
-        let mut next = 0;
-        while let Some(&(t, at)) = star.get(next) {
-            next += 1;
-            for (face, n) in self.neighbors[t as usize].into_iter().enumerate() {
-                if face != at && n != NONE && self.number_tet(n, 0).is_none() {
-                    star.push((n, corner_of(&self.tets[n as usize], slot)));
-                }
-            }
-        }
-        star
-    }
-
-    /// Whether a direction from corner `at` of tetrahedron `t` leads into it, or along a face.
-    fn holds(&self, t: u32, at: usize, direction: [i32; 3]) -> bool {
+    /// Whether a direction from the corner in `slot` of tetrahedron `t` leads into it, or along a face.
+    fn holds(&self, t: u32, slot: u32, direction: [i32; 3]) -> bool {
+        let at = corner_of(&self.tets[t as usize], slot);
         let corners = self.tets[t as usize].map(|v| self.positions[v as usize]);
         let point = [0, 1, 2].map(|k| corners[at][k].saturating_add(direction[k]));
         let largest = 1 << crate::geom::WIDE_BITS;
@@ -534,24 +510,15 @@ impl ApplyUpdates for HalfEdgeMt {
     }
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let applied = self.insert(mesh, u, Search::Everywhere, &mut state);
-        mesh.put_back_kind_state(state);
-        applied
+        mesh.with_kind_state(|mesh, state| self.insert(mesh, u, Search::Everywhere, state))
     }
 
     fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let applied = self.insert(mesh, u, Search::Nearby, &mut state);
-        mesh.put_back_kind_state(state);
-        applied
+        mesh.with_kind_state(|mesh, state| self.insert(mesh, u, Search::Nearby, state))
     }
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let applied = self.remove(mesh, u, &mut state.scratch);
-        mesh.put_back_kind_state(state);
-        applied
+        mesh.with_kind_state(|mesh, State { scratch, .. }| self.remove(mesh, u, scratch))
     }
 
     fn look_at_removed(
@@ -560,10 +527,11 @@ impl ApplyUpdates for HalfEdgeMt {
         u: UpdateId,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let star = &mut state.scratch.gathered;
-        let found = self.collect_inserted(mesh, u, star);
-        if let Ok(Ok([slot, near])) = found {
+        mesh.with_kind_state(|mesh, State { scratch: Scratch { gathered: star, .. }, .. }| {
+            let [slot, near] = match self.collect_inserted(mesh, u, star)? {
+                Ok(slots) => slots,
+                Err(child) => return Ok(Applied::Blocked(child)),
+            };
             let tets = star.tets[..star.len].iter().map(|&t| mesh.tets[t as usize]);
             for tet in tets.filter(|tet| !tet.contains(&near)) {
                 let tet = tet.map(|v| if v == slot { near } else { v });
@@ -572,9 +540,8 @@ impl ApplyUpdates for HalfEdgeMt {
                     break;
                 }
             }
-        }
-        mesh.put_back_kind_state(state);
-        Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
+            Ok(Applied::Done)
+        })
     }
 
     /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
@@ -582,30 +549,16 @@ impl ApplyUpdates for HalfEdgeMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        let mut state = take_state(mesh);
-        let collected = self.collect_removed(mesh, u, Search::Everywhere, &mut state.scratch);
-        if collected == Ok(Applied::Done) {
-            found.extend_from_slice(&state.scratch.removed[..state.scratch.removed_len]);
-        }
-        mesh.put_back_kind_state(state);
-        match collected? {
-            Applied::Done => Ok(()),
-            Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
-        }
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+        mesh.with_kind_state(|mesh, State { scratch, .. }| {
+            match self.collect_removed(mesh, u, Search::Everywhere, scratch)? {
+                Applied::Done => Ok(scratch.removed[..scratch.removed_len].to_vec()),
+                Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
+            }
+        })
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        mesh.find_star(u, self.vertex(u), found)
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+        mesh.find_star(u, self.vertex(u))
     }
 }

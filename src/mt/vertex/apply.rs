@@ -4,7 +4,7 @@
 //! tag is the number of that child of the tetrahedron's creator.
 
 use super::bit_string::width_of;
-use super::cavity::{Cavity, SLOTS, Wall, with_cavity};
+use super::cavity::{Cavity, SLOTS, Wall};
 use super::cavity_fill::{Across, Close, Face, turned};
 use super::limits::{COUNT_BITS, MAX_AROUND, MAX_INSERTED};
 use super::shape_code::{Code, write_given_up};
@@ -631,11 +631,11 @@ impl ApplyUpdates for VertexMt {
     }
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| self.insert(mesh, u, cavity))
+        mesh.with_kind_state(|mesh, cavity| self.insert(mesh, u, cavity))
     }
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity));
             if rebuilt == Ok(Applied::Done) {
                 self.perform_removal(mesh, u, cavity, |_| u.0);
@@ -650,7 +650,7 @@ impl ApplyUpdates for VertexMt {
         u: UpdateId,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity));
             if rebuilt == Ok(Applied::Done) {
                 show_built(mesh, cavity, self.kept_quarterings(u, cavity), look);
@@ -664,27 +664,16 @@ impl ApplyUpdates for VertexMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+        mesh.with_kind_state(|mesh, cavity| {
             let Applied::Done = self.gather_removed(mesh, u, self.shape(u).removed, cavity)? else {
                 return Err(UpdateError::Error { update: u.0 });
             };
-            found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
-            Ok(())
+            Ok(cavity.tets[..cavity.tets_len].to_vec())
         })
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        mesh.find_star(u, self.vertex(u), found)
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+        mesh.find_star(u, self.vertex(u))
     }
 }

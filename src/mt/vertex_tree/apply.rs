@@ -12,7 +12,7 @@ use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::stars::BARE;
 use crate::mt::vertex::apply::show_built;
 use crate::mt::vertex::bit_string::width_of;
-use crate::mt::vertex::cavity::{Cavity, with_cavity};
+use crate::mt::vertex::cavity::Cavity;
 use crate::mt::vertex::cavity_fill::Face;
 use crate::mt::vertex::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 use crate::mt::{
@@ -238,11 +238,11 @@ impl ApplyUpdates for VertexTreeMt {
     }
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| self.insert(mesh, u, cavity))
+        mesh.with_kind_state(|mesh, cavity| self.insert(mesh, u, cavity))
     }
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity);
             if rebuilt == Ok(Applied::Done) {
                 // The first tetrahedron of the stream is t_u.
@@ -258,7 +258,7 @@ impl ApplyUpdates for VertexTreeMt {
         u: UpdateId,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity);
             if rebuilt == Ok(Applied::Done) {
                 show_built(mesh, cavity, None, look);
@@ -272,28 +272,17 @@ impl ApplyUpdates for VertexTreeMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
         if self.missing_parent(mesh, u).is_some() {
             return Err(UpdateError::Error { update: u.0 });
         }
-        with_cavity(mesh, |mesh, cavity| {
+        mesh.with_kind_state(|mesh, cavity| {
             self.recognise(mesh, u, cavity).ok_or(UpdateError::Cavity { update: u.0 })?;
-            found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
-            Ok(())
+            Ok(cavity.tets[..cavity.tets_len].to_vec())
         })
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        mesh.find_star(u, self.vertex(u), found)
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+        mesh.find_star(u, self.vertex(u))
     }
 }

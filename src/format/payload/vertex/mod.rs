@@ -174,8 +174,7 @@ fn put(
 fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State) -> Result<(), UpdateError> {
     let torn = UpdateError::Cavity { update: u.0 };
     put_errors(out, ERROR, &mut state.errors, mt.errors(u));
-    let mut removed = Vec::new();
-    mt.find_removed(&mut state.mesh, u, &mut removed)?;
+    let removed = mt.find_removed(&mut state.mesh, u)?;
     let position = mt.position(u);
     let (near, fan) = state.near(&removed, position).ok_or(torn.clone())?;
     out.symbol(FAN, 0, u32::from(fan));
