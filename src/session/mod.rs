@@ -25,7 +25,6 @@ mod block_state;
 mod blocks;
 mod client;
 mod depths;
-mod pieces;
 mod quantity;
 mod reading;
 
@@ -84,8 +83,7 @@ pub struct Session {
     decoder: Decoder,
     /// There from the moment the base mesh is.
     front: Option<Front>,
-    /// For a file that comes in parts.
-    blocks: Option<Blocks>,
+    blocks: Blocks,
     failed: Option<FormatError>,
     /// What was asked for last.
     request: Request,
@@ -230,7 +228,8 @@ impl Session {
         let criterion: Arc<dyn Criterion> = Arc::new(criterion);
         front.request(mt, Arc::clone(&criterion), request.budget);
         self.request.clone_from(request);
-        self.plan_for(criterion);
+        // What it needs is worked out when the mesh has moved: what a mesh that was made for another request asks for may not be needed.
+        self.blocks.criterion = Some(criterion);
         Ok(())
     }
 
@@ -396,8 +395,8 @@ impl Session {
     /// # Errors
     /// As [`Decoder::take_exact`].
     pub fn take_exact(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
-        if let (Some(range), Some(blocks)) = (self.exact_range(), &mut self.blocks) {
-            blocks.arrive(range.start, bytes.len());
+        if let Some(range) = self.exact_range() {
+            self.blocks.arrive(range.start, bytes.len());
         }
         self.decoder.take_exact(bytes)
     }
