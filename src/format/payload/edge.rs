@@ -6,15 +6,14 @@
 
 use super::base;
 use super::changes::{FieldPart, put_changes, range_of, read_changes};
-use super::codec::{Codec, Head, InOrder, Parts, Started, put_in_order, sections_in_order};
-use crate::format::coder::{Family, Models, Put, Source};
+use super::codec::{Codec, Head, InOrder, Parts, Started};
+use crate::format::coder::{Family, Put, Source};
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
-use crate::format::section::Section;
-use crate::format::{EncodeError, FormatError, Limits};
+use crate::format::{FormatError, Limits};
 use crate::mt::{
     BaseMesh, BaseMeshError, EdgeMt, EdgeUpdate, ErrorCode, MAX_EDGE, Mt, MtInfo, MtKind, MultiTessellation,
-    UpdateId, VertexId,
+    UpdateError, UpdateId, VertexId,
 };
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -99,18 +98,20 @@ impl Codec for EdgeMt {
         Ok(Box::new(Splitting))
     }
 
-    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
-        put_in_order(out, self, |out, updates| {
-            put(out, self, updates);
-            Ok(())
-        })
+    type Writing = ();
+
+    fn writing(&self) -> Result<(), BaseMeshError> {
+        Ok(())
     }
 
-    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
-        sections_in_order(self, models, |out, updates| {
-            put(out, self, updates);
-            Ok(())
-        })
+    fn put_block(&self, out: &mut impl Put, updates: Range<u32>, _: &mut ()) -> Result<(), UpdateError> {
+        put_splits(out, self, updates.clone());
+        for field in 0..self.info().fields.len() {
+            put_changes(out, [ERROR, LEVEL], updates.clone().map(UpdateId), |u| {
+                (self.error_of_field(u, field), self.level_residuals(u).nth(field).unwrap_or(0))
+            });
+        }
+        Ok(())
     }
 }
 
@@ -173,16 +174,6 @@ fn runs(mt: &EdgeMt, first: u32, vertices: &[u32]) -> Vec<u32> {
         runs.push(run);
     }
     runs
-}
-
-/// Puts a block of an MT.
-fn put(out: &mut impl Put, mt: &EdgeMt, updates: Range<u32>) {
-    put_splits(out, mt, updates.clone());
-    for field in 0..mt.info().fields.len() {
-        put_changes(out, [ERROR, LEVEL], updates.clone().map(UpdateId), |u| {
-            (mt.error_of_field(u, field), mt.level_residuals(u).nth(field).unwrap_or(0))
-        });
-    }
 }
 
 /// Puts updates without what they do to fields.

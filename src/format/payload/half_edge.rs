@@ -15,7 +15,7 @@ use crate::format::{EncodeError, FormatError, Limits};
 use crate::mesh::NONE;
 use crate::mt::{
     BaseMark, BaseMesh, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, HalfEdgeUpdate, MtFacts, MtInfo,
-    MtKind, MultiTessellation, UpdateId, UpdatePages,
+    MtKind, MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use crate::threads;
 use std::ops::Range;
@@ -107,35 +107,73 @@ impl Codec for HalfEdgeMt {
         own_bytes(info.fields.len() as u64) + size_of::<ForestChild>() as u64
     }
 
+    /// Puts what removes the base tetrahedra, and the forest children of the base vertices.
     fn put_head(&self, out: &mut impl Put) {
-        put_head(out, self);
+        for mark in self.base_marks() {
+            out.number(REMOVER, 0, mark.remover.wrapping_add(1));
+            if mark.remover != NONE {
+                out.symbol(BASE_INNER, 0, u32::from(mark.inner));
+            }
+        }
+        let mut named = Named::behind(0);
+        for v in (0..self.base().positions.len() as u32).map(VertexId) {
+            put_children(out, &mut named, self.children_of(v), self.page_bits());
+        }
     }
 
     fn read_head(
         source: &mut Source<'_>,
         info: &MtInfo,
-        counts: [u32; 2],
+        [vertices, tets]: [u32; 2],
         block_bits: u32,
         limits: &Limits,
     ) -> Result<Box<dyn Head>, FormatError> {
-        Ok(Box::new(read_head(source, info, counts, block_bits, limits)?))
+        let mut head = BaseHead::default();
+        for _ in 0..tets {
+            let remover = source.number(REMOVER, 0)?.wrapping_sub(1);
+            let inner = if remover == NONE { 0 } else { source.symbol(BASE_INNER, 0)? as u8 };
+            head.marks.push(BaseMark { remover, inner });
+        }
+        let (mut named, mut left) = (Named::behind(0), most_children(info, limits));
+        for _ in 0..vertices {
+            let children = read_children(source, &mut named, block_bits, left)?;
+            left -= children.len() as u32;
+            head.children.push(children);
+        }
+        Ok(Box::new(head))
     }
 
-    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
-        (0..blocks(self) as u32).for_each(|block| put_block(out, self, block));
+    type Writing = ();
+
+    fn writing(&self) -> Result<(), BaseMeshError> {
         Ok(())
+    }
+
+    fn put_block(&self, out: &mut impl Put, updates: Range<u32>, _: &mut ()) -> Result<(), UpdateError> {
+        put(out, self, updates.clone());
+        (0..self.info().fields.len()).for_each(|field| put_field(out, self, updates.clone(), field));
+        Ok(())
+    }
+
+    /// The index says how large errors are.
+    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
+        (0..blocks(self) as u32)
+            .try_for_each(|block| self.put_block(out, self.page_updates(block), &mut ()))
+            .map_err(EncodeError::Update)
     }
 
     /// Blocks do not depend on each other.
     fn count_updates(&self) -> Result<Counts, EncodeError> {
         let of_ranges = threads::map(blocks(self), COUNTED, |blocks| {
             let mut counts = Counts::default();
-            blocks.for_each(|block| put_block(&mut counts, self, block as u32));
-            counts
+            let mut pages = blocks.map(|block| self.page_updates(block as u32));
+            let put = pages.try_for_each(|updates| self.put_block(&mut counts, updates, &mut ()));
+            put.map(|()| counts).map_err(EncodeError::Update)
         });
-        let mut all = Counts::default();
-        of_ranges.iter().for_each(|counts| all.add(counts));
-        Ok(all)
+        of_ranges.into_iter().try_fold(Counts::default(), |mut all, counts| {
+            all.add(&counts?);
+            Ok(all)
+        })
     }
 
     fn known_facts(&self) -> Option<&MtFacts> {
@@ -151,11 +189,6 @@ impl Codec for HalfEdgeMt {
 /// How many blocks an MT has.
 fn blocks(mt: &HalfEdgeMt) -> usize {
     mt.updates().div_ceil(1 << mt.page_bits()) as usize
-}
-
-fn put_block(out: &mut impl Put, mt: &HalfEdgeMt, block: u32) {
-    put(out, mt, mt.page_updates(block));
-    (0..mt.info().fields.len()).for_each(|field| put_field(out, mt, mt.page_updates(block), field));
 }
 
 /// The sections of a block: one that all fields share, and one for each field.
@@ -281,20 +314,6 @@ fn read_children(
     Ok(children)
 }
 
-/// Puts what removes the base tetrahedra, and the forest children of the base vertices.
-fn put_head(out: &mut impl Put, mt: &HalfEdgeMt) {
-    for mark in mt.base_marks() {
-        out.number(REMOVER, 0, mark.remover.wrapping_add(1));
-        if mark.remover != NONE {
-            out.symbol(BASE_INNER, 0, u32::from(mark.inner));
-        }
-    }
-    let mut named = Named::behind(0);
-    for v in 0..mt.base().positions.len() as u32 {
-        put_children(out, &mut named, mt.children_of(crate::mt::VertexId(v)), mt.page_bits());
-    }
-}
-
 /// Forest children that can be held. Symbols may take no bits, so what arrives does not bound their number.
 fn most_children(info: &MtInfo, limits: &Limits) -> u32 {
     let held = limits.memory_bytes / size_of::<ForestChild>() as u64;
@@ -318,29 +337,6 @@ impl Head for BaseHead {
     ) -> Result<Started, FormatError> {
         Ok((HalfEdgeMt::new(info, base, self.marks, &self.children, block_bits)?.into(), None))
     }
-}
-
-/// Reads what [`put_head`] puts.
-fn read_head(
-    source: &mut Source<'_>,
-    info: &MtInfo,
-    [vertices, tets]: [u32; 2],
-    block_bits: u32,
-    limits: &Limits,
-) -> Result<BaseHead, FormatError> {
-    let mut head = BaseHead::default();
-    for _ in 0..tets {
-        let remover = source.number(REMOVER, 0)?.wrapping_sub(1);
-        let inner = if remover == NONE { 0 } else { source.symbol(BASE_INNER, 0)? as u8 };
-        head.marks.push(BaseMark { remover, inner });
-    }
-    let (mut named, mut left) = (Named::behind(0), most_children(info, limits));
-    for _ in 0..vertices {
-        let children = read_children(source, &mut named, block_bits, left)?;
-        left -= children.len() as u32;
-        head.children.push(children);
-    }
-    Ok(head)
 }
 
 fn put_star(out: &mut impl Put, star: &[u8]) {
