@@ -5,6 +5,7 @@ use super::ids::{Applied, UpdateId};
 use super::info::MtInfo;
 use super::mesh::base::{BaseMesh, BaseMeshError};
 use super::mesh::current::CurrentMesh;
+use super::pages::updates_of_page;
 use enum_dispatch::enum_dispatch;
 use std::ops::Range;
 
@@ -94,9 +95,7 @@ pub trait UpdatePages: MultiTessellation {
 
     /// The updates of page `page`, which come and go together; none if there is no such page.
     fn page_updates(&self, page: u32) -> Range<u32> {
-        let first = u64::from(page) << self.page_bits();
-        let end = u64::from(self.info().updates);
-        first.min(end) as u32..(first + (1 << self.page_bits())).min(end) as u32
+        updates_of_page(self.page_bits(), page, self.info().updates)
     }
 
     /// Declares that no update which is still to come has larger errors than these, by field; until then, any may come. Without

@@ -445,7 +445,10 @@ impl UpdatePages for HalfEdgeMt {
     }
 
     fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
-        self.take_page(page)
+        let gone = self.pages.remove(page).ok_or(PageError::Absent { page })?;
+        self.facts = None;
+        self.forget_children(gone.children.items());
+        Ok(())
     }
 
     fn update_bytes(&self) -> u64 {
@@ -459,7 +462,7 @@ impl UpdatePages for HalfEdgeMt {
 
     fn awaited_errors(&self, mesh: &CurrentMesh, t: u32) -> Option<&[ErrorCode]> {
         match mesh.tag(t) {
-            NONE => Some(self.no_errors()),
+            NONE => Some(&self.zeros),
             u if self.has(UpdateId(u)) => None,
             u => Some(self.bounds_of(UpdateId(u))),
         }

@@ -80,8 +80,8 @@ pub struct HalfEdgeMt {
     /// Page by page and field by field, what bounds the errors of a page that is not here.
     bounds: Vec<ErrorCode>,
     /// One for each field.
-    zeros: Vec<ErrorCode>,
-    facts: Option<Box<MtFacts>>,
+    pub(super) zeros: Vec<ErrorCode>,
+    pub(super) facts: Option<Box<MtFacts>>,
 }
 
 /// Two MTs are equal if they have the same updates, whatever their pages.
@@ -100,7 +100,7 @@ impl PartialEq for HalfEdgeMt {
 /// Updates that come and go together.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HalfEdgePage {
-    children: Rows<ForestChild>,
+    pub(super) children: Rows<ForestChild>,
     stars: Rows<u8>,
     level_residuals: Vec<i32>,
     errors: Errors,
@@ -247,7 +247,7 @@ impl HalfEdgeMt {
         Ok(())
     }
 
-    fn forget_children(&mut self, children: &[ForestChild]) {
+    pub(super) fn forget_children(&mut self, children: &[ForestChild]) {
         children.iter().for_each(|child| self.near.set(child.update, NONE));
     }
 
@@ -284,18 +284,6 @@ impl HalfEdgeMt {
         Ok(())
     }
 
-    /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
-    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction).
-    ///
-    /// # Errors
-    /// If the page is not here.
-    pub(super) fn take_page(&mut self, page: u32) -> Result<(), PageError> {
-        let gone = self.pages.remove(page).ok_or(PageError::Absent { page })?;
-        self.facts = None;
-        self.forget_children(gone.children.items());
-        Ok(())
-    }
-
     /// Tells what bounds the errors of the updates of each page, page by page and field by field, for as long as a page is not
     /// here.
     pub fn set_page_bounds(&mut self, bounds: Vec<ErrorCode>) {
@@ -304,15 +292,11 @@ impl HalfEdgeMt {
 
     /// What bounds the errors of update `u`, field by field, which is not here.
     #[inline]
-    pub(in crate::mt) fn bounds_of(&self, u: UpdateId) -> &[ErrorCode] {
+    pub(super) fn bounds_of(&self, u: UpdateId) -> &[ErrorCode] {
         let fields = self.zeros.len();
         let at = self.pages.page_of(u.0) as usize * fields;
         // A page without bounds has those of the first entries.
         self.bounds.get(at..at + fields).or_else(|| self.bounds.get(..fields)).unwrap_or(&self.zeros)
-    }
-
-    pub(in crate::mt) fn no_errors(&self) -> &[ErrorCode] {
-        &self.zeros
     }
 
     /// For each base tetrahedron, what removes it.
