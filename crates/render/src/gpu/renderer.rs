@@ -98,14 +98,8 @@ impl Renderer {
 
     fn new(context: Context, target: Target) -> Result<Self, GpuError> {
         let common = Common::new(&context, target.format);
-        let background = PipelineSpec {
-            shader: "background",
-            vertex: "vs",
-            fragment: "fs",
-            buffers: &[],
-            groups: &[],
-            output: Output::Over(wgpu::CompareFunction::Always),
-        };
+        let over = Output::Over(wgpu::CompareFunction::Always);
+        let background = PipelineSpec::new("background", ["vs", "fs"], &[], over);
         let renderer = Self {
             background: background.create(&context, &common),
             surface_pipelines: SurfacePipelines::new(&context, &common),
