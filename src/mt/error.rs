@@ -146,6 +146,9 @@ pub enum UpdateError {
     },
 }
 
+/// What comes of an update.
+pub(in crate::mt) type Result<T, E = UpdateError> = std::result::Result<T, E>;
+
 /// Why a page of updates cannot come or go; the MT is as it was.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]

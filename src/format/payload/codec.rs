@@ -2,9 +2,10 @@
 
 use super::changes::{bound_of, upper_byte};
 use crate::format::coder::{Counts, Family, Models, Put, Source};
+use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::section::Section;
-use crate::format::{EncodeError, FormatError, Limits};
+use crate::format::{EncodeError, Limits};
 use crate::mt::{
     ApplyUpdates, BaseMesh, BaseMeshError, ErrorCode, Mt, MtFacts, MtInfo, MtKind, UpdateError, UpdateId,
 };
@@ -42,7 +43,7 @@ pub trait Codec: ApplyUpdates + Sized {
         counts: [u32; 2],
         block_bits: u32,
         limits: &Limits,
-    ) -> Result<Box<dyn Head>, FormatError>;
+    ) -> Result<Box<dyn Head>>;
 
     /// What a writer keeps from one block to the next.
     type Writing;
@@ -106,7 +107,7 @@ pub trait Head: Debug + Send + Sync {
         base: BaseMesh,
         block_bits: u32,
         tet_errors: bool,
-    ) -> Result<Started, FormatError>;
+    ) -> Result<Started>;
 }
 
 /// An MT without updates, and what reads these if they come in order.
@@ -115,13 +116,7 @@ pub type Started = (Mt, Option<Box<dyn InOrder>>);
 /// What reads updates that come in order, block by block.
 pub trait InOrder: Debug + Send + Sync {
     /// Reads the next `count` updates into the MT.
-    fn read(
-        &mut self,
-        source: &mut Source<'_>,
-        mt: &mut Mt,
-        count: u32,
-        limits: &Limits,
-    ) -> Result<(), FormatError>;
+    fn read(&mut self, source: &mut Source<'_>, mt: &mut Mt, count: u32, limits: &Limits) -> Result<()>;
 }
 
 /// For each block and field what bounds the errors of the updates behind the block: see [`upper_byte`].
@@ -139,6 +134,6 @@ fn bounds_behind(mt: &impl Codec) -> Vec<Vec<u8>> {
 }
 
 /// Reads what bounds the errors of the updates behind a block that is one of those in order.
-pub fn read_bounds(source: &mut Source<'_>, fields: usize) -> Result<Vec<ErrorCode>, FormatError> {
+pub fn read_bounds(source: &mut Source<'_>, fields: usize) -> Result<Vec<ErrorCode>> {
     (0..fields).map(|_| Ok(bound_of(source.bits(8)? as u8))).collect()
 }

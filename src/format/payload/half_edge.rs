@@ -8,10 +8,11 @@ use super::base;
 use super::changes::{FieldPart, put_changes, range_of, read_changes};
 use super::codec::{Codec, Head, Parts, Started};
 use crate::format::coder::{Counts, Family, Models, Put, Source, Writer};
+use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
 use crate::format::section::Section;
-use crate::format::{EncodeError, FormatError, Limits};
+use crate::format::{EncodeError, Limits};
 use crate::mesh::NONE;
 use crate::mt::{
     BaseMark, BaseMesh, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, HalfEdgeUpdate, MtFacts, MtInfo,
@@ -127,7 +128,7 @@ impl Codec for HalfEdgeMt {
         [vertices, tets]: [u32; 2],
         block_bits: u32,
         limits: &Limits,
-    ) -> Result<Box<dyn Head>, FormatError> {
+    ) -> Result<Box<dyn Head>> {
         let mut head = BaseHead::default();
         for _ in 0..tets {
             let remover = source.number(REMOVER, 0)?.wrapping_sub(1);
@@ -268,7 +269,7 @@ fn put_offset(out: &mut impl Put, named: &mut Named, offset: [i32; 3]) {
     named.length = longest;
 }
 
-fn read_offset(source: &mut Source<'_>, named: &mut Named) -> Result<[i32; 3], FormatError> {
+fn read_offset(source: &mut Source<'_>, named: &mut Named) -> Result<[i32; 3]> {
     let mut context = named.length;
     let (mut offset, mut longest) = ([0; 3], 0);
     for (axis, d) in (0..).zip(&mut offset) {
@@ -285,7 +286,7 @@ fn read_children(
     named: &mut Named,
     block_bits: u32,
     most: u32,
-) -> Result<Vec<ForestChild>, FormatError> {
+) -> Result<Vec<ForestChild>> {
     let count = source.number(CHILDREN, 0)?;
     if count > most {
         return Err(source.corrupt("a vertex has more children than there are updates"));
@@ -328,13 +329,7 @@ struct BaseHead {
 }
 
 impl Head for BaseHead {
-    fn start(
-        self: Box<Self>,
-        info: MtInfo,
-        base: BaseMesh,
-        block_bits: u32,
-        _: bool,
-    ) -> Result<Started, FormatError> {
+    fn start(self: Box<Self>, info: MtInfo, base: BaseMesh, block_bits: u32, _: bool) -> Result<Started> {
         Ok((HalfEdgeMt::new(info, base, self.marks, &self.children, block_bits)?.into(), None))
     }
 }
@@ -360,7 +355,7 @@ fn put_star(out: &mut impl Put, star: &[u8]) {
 /// Most bits that the star of an update can have: three faces of each tetrahedron.
 const MOST_BITS: u32 = 3 * 128;
 
-fn read_star(source: &mut Source<'_>, star: &mut Vec<u8>) -> Result<(), FormatError> {
+fn read_star(source: &mut Source<'_>, star: &mut Vec<u8>) -> Result<()> {
     let count = source.symbol(SYMBOLS, 0)?;
     star.push(count as u8);
     for place in 0..count {
@@ -403,13 +398,7 @@ pub struct Insertions {
 
 impl Insertions {
     /// Adds them to an MT as a page, with what they do to each of its fields.
-    pub fn insert(
-        self,
-        mt: &mut HalfEdgeMt,
-        page: u32,
-        fields: &[FieldPart],
-        limits: &Limits,
-    ) -> Result<(), FormatError> {
+    pub fn insert(self, mt: &mut HalfEdgeMt, page: u32, fields: &[FieldPart], limits: &Limits) -> Result<()> {
         check_bytes(mt.bytes() + self.bytes(fields.len() as u64), limits)?;
         let stride = fields.len().max(1);
         let rows = 0..self.stars.len();
@@ -444,7 +433,7 @@ pub fn read(
     block_bits: u32,
     updates: Range<u32>,
     limits: &Limits,
-) -> Result<Insertions, FormatError> {
+) -> Result<Insertions> {
     let mut insertions = Insertions::default();
     let (mut named, mut left) = (Named::behind(updates.start >> block_bits), most_children(info, limits));
     for _ in updates {
@@ -468,6 +457,6 @@ fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, updates: Range<u32>, field: us
 }
 
 /// Reads what the `count` updates of a block do to a field.
-pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart, FormatError> {
+pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart> {
     read_changes(source, [ERROR, LEVEL], count)
 }

@@ -15,6 +15,7 @@
 use super::predict::Link;
 use super::star::{FAN_CAPACITY, HalfStar, RING_CAPACITY, Ring};
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{GATHERED, Gather};
 use crate::mt::mesh::tet::{TURN, corner_of};
@@ -36,7 +37,7 @@ impl EdgeMt {
     /// # Errors
     /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not updated by
     /// [`UpdatePages::updates_arrived`]; the mesh is unchanged then.
-    fn split(&self, mesh: &mut CurrentMesh, u: UpdateId, ring: &mut Ring) -> Result<Applied, UpdateError> {
+    fn split(&self, mesh: &mut CurrentMesh, u: UpdateId, ring: &mut Ring) -> Result<Applied> {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
@@ -66,7 +67,7 @@ impl EdgeMt {
         p: u32,
         ring: &mut Ring,
         field_offsets: &mut [i32],
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let update = u.0;
         match mesh.gather_ring(p, update, ring) {
             Ok(()) => {}
@@ -103,13 +104,7 @@ impl EdgeMt {
     }
 
     /// Positions of `v'` and `v''`, checked against the lattices like the levels.
-    fn halve(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        split: &Offsets<'_>,
-        p: u32,
-    ) -> Result<[[i32; 3]; 2], UpdateError> {
+    fn halve(&self, mesh: &CurrentMesh, u: UpdateId, split: &Offsets<'_>, p: u32) -> Result<[[i32; 3]; 2]> {
         let off = UpdateError::OffLattice { update: u.0 };
         let largest = 1_i64 << self.info().lattice.bits;
         let mut positions = [[0; 3]; 2];
@@ -203,7 +198,7 @@ impl EdgeMt {
     ///
     /// # Errors
     /// Never for an update that was applied to this mesh by [`Self::split`].
-    fn collapse(&self, mesh: &mut CurrentMesh, u: UpdateId, ring: &mut Ring) -> Result<Applied, UpdateError> {
+    fn collapse(&self, mesh: &mut CurrentMesh, u: UpdateId, ring: &mut Ring) -> Result<Applied> {
         let [p, q] = match self.collapsible(mesh, u, ring)? {
             Ok(slots) => slots,
             Err(child) => return Ok(Applied::Blocked(child)),
@@ -242,7 +237,7 @@ impl EdgeMt {
         mesh: &mut CurrentMesh,
         u: UpdateId,
         ring: &mut Ring,
-    ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
+    ) -> Result<Result<[u32; 2], UpdateId>> {
         let update = u.0;
         if !self.has(u) {
             return Err(UpdateError::Missing { update });
@@ -363,14 +358,14 @@ impl ApplyUpdates for EdgeMt {
         mesh.tets[t as usize].iter().filter_map(|&v| self.created_by(mesh.vertex(v))).max()
     }
 
-    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
         mesh.find_star(u, self.split_vertex(u))
     }
 
-    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         let [near, far] = self.created(u);
         let mut found = mesh.find_star(u, near)?;
         let of_far = mesh.find_star(u, far)?;
@@ -385,20 +380,15 @@ impl ApplyUpdates for EdgeMt {
         self.created(u).iter().all(|&v| mesh.slot(v).is_some())
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         mesh.with_kind_state(|mesh, ring| self.split(mesh, u, ring))
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         mesh.with_kind_state(|mesh, ring| self.collapse(mesh, u, ring))
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
         mesh.with_kind_state(|mesh, ring| {
             let slots = match self.collapsible(mesh, u, ring)? {
                 Ok(slots) => slots,

@@ -8,6 +8,7 @@ use super::star_code::{KnownStars, StarCode};
 use super::store::HalfEdgeMt;
 use crate::geom::orient3d;
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::mesh::KindState;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{Gather, Star};
@@ -58,7 +59,7 @@ impl HalfEdgeMt {
         u: UpdateId,
         search: Search,
         scratch: &mut Scratch,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let update = u.0;
         let torn = UpdateError::Cavity { update };
         if !self.has(u) {
@@ -90,7 +91,7 @@ impl HalfEdgeMt {
         u: UpdateId,
         slot: u32,
         search: Search,
-    ) -> Result<Result<u32, UpdateId>, UpdateError> {
+    ) -> Result<Result<u32, UpdateId>> {
         let mut star = Vec::new();
         mesh.list_star(slot, &mut star);
         if let Some(&t) = star.iter().find(|&&t| mesh.tag(t) == u.0) {
@@ -111,7 +112,7 @@ impl HalfEdgeMt {
     }
 
     /// A parent of `u` that is not in the mesh, found by applying all updates before `u` to another one.
-    fn find_parent(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<UpdateId, UpdateError> {
+    fn find_parent(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<UpdateId> {
         let torn = UpdateError::Cavity { update: u.0 };
         let mut other = self.start().map_err(|_| torn.clone())?;
         let mut state = Box::<State>::default();
@@ -168,12 +169,7 @@ impl HalfEdgeMt {
     }
 
     /// Positions and levels of the new vertex.
-    fn place_vertex(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        scratch: &mut Scratch,
-    ) -> Result<[i32; 3], UpdateError> {
+    fn place_vertex(&self, mesh: &CurrentMesh, u: UpdateId, scratch: &mut Scratch) -> Result<[i32; 3]> {
         let off = UpdateError::OffLattice { update: u.0 };
         let near = mesh.vertex(scratch.link[0]);
         let children = self.children_of(near);
@@ -197,7 +193,7 @@ impl HalfEdgeMt {
         u: UpdateId,
         search: Search,
         scratch: &mut Scratch,
-    ) -> Result<Result<[i32; 3], UpdateId>, UpdateError> {
+    ) -> Result<Result<[i32; 3], UpdateId>> {
         if let Applied::Blocked(before) = self.collect_removed(mesh, u, search, scratch)? {
             return Ok(Err(before));
         }
@@ -218,7 +214,7 @@ impl HalfEdgeMt {
         u: UpdateId,
         search: Search,
         state: &mut State,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let State { scratch, code, known } = state;
         let position = match self.prepare(mesh, u, search, scratch)? {
             Ok(position) => position,
@@ -283,7 +279,7 @@ impl HalfEdgeMt {
         mesh: &mut CurrentMesh,
         u: UpdateId,
         star: &mut Star,
-    ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
+    ) -> Result<Result<[u32; 2], UpdateId>> {
         let vertex = self.vertex(u).0;
         let absent = UpdateError::Vertex { update: u.0, vertex };
         let slot = mesh.slot(VertexId(vertex)).ok_or(absent.clone())?;
@@ -299,12 +295,7 @@ impl HalfEdgeMt {
         Ok(Ok([slot, near]))
     }
 
-    fn remove(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        scratch: &mut Scratch,
-    ) -> Result<Applied, UpdateError> {
+    fn remove(&self, mesh: &mut CurrentMesh, u: UpdateId, scratch: &mut Scratch) -> Result<Applied> {
         let star = &mut scratch.gathered;
         let [slot, near] = match self.collect_inserted(mesh, u, star)? {
             Ok(slots) => slots,
@@ -358,7 +349,7 @@ impl CurrentMesh {
         slot: u32,
         first: u32,
         scratch: &mut Scratch,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let torn = || UpdateError::Cavity { update };
         self.next_epoch();
         self.number_tet(first, 0);
@@ -512,24 +503,19 @@ impl ApplyUpdates for HalfEdgeMt {
         mesh.is_newest_nearby(self.vertex(u))
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         mesh.with_kind_state(|mesh, state| self.insert(mesh, u, Search::Everywhere, state))
     }
 
-    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         mesh.with_kind_state(|mesh, state| self.insert(mesh, u, Search::Nearby, state))
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         mesh.with_kind_state(|mesh, State { scratch, .. }| self.remove(mesh, u, scratch))
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
         mesh.with_kind_state(|mesh, State { scratch: Scratch { gathered: star, .. }, .. }| {
             let [slot, near] = match self.collect_inserted(mesh, u, star)? {
                 Ok(slots) => slots,
@@ -552,7 +538,7 @@ impl ApplyUpdates for HalfEdgeMt {
         [0; 3]
     }
 
-    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         mesh.with_kind_state(|mesh, State { scratch, .. }| {
             match self.collect_removed(mesh, u, Search::Everywhere, scratch)? {
                 Applied::Done => Ok(scratch.removed[..scratch.removed_len].to_vec()),
@@ -561,7 +547,7 @@ impl ApplyUpdates for HalfEdgeMt {
         })
     }
 
-    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         mesh.find_star(u, self.vertex(u))
     }
 }

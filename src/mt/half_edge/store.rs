@@ -24,6 +24,7 @@
 //! consistent set.
 
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::facts::MtFacts;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::pages::{Page, Pages, Rows};
@@ -149,7 +150,7 @@ impl HalfEdgeMt {
         marks: Vec<BaseMark>,
         children: &[Vec<ForestChild>],
         page_bits: u32,
-    ) -> Result<Self, UpdateError> {
+    ) -> Result<Self> {
         let known = |mark: &BaseMark| mark.remover < info.updates || mark.remover == NONE;
         let fits = marks.len() == base.tets.len() && children.len() == base.positions.len();
         if !fits || !marks.iter().all(known) {
@@ -176,12 +177,7 @@ impl HalfEdgeMt {
     }
 
     /// Children come after the update that they are stored with, in ascending order.
-    fn check_children(
-        &self,
-        update: u32,
-        after: Option<u32>,
-        row: &[ForestChild],
-    ) -> Result<(), UpdateError> {
+    fn check_children(&self, update: u32, after: Option<u32>, row: &[ForestChild]) -> Result<()> {
         let rising = row.windows(2).all(|pair| pair[0].update < pair[1].update);
         let first = row.first().is_none_or(|child| after.is_none_or(|after| child.update > after));
         let known = row.last().is_none_or(|child| child.update < self.info.updates);
@@ -194,7 +190,7 @@ impl HalfEdgeMt {
     }
 
     /// Checks what does not need the mesh.
-    fn check(&self, update: u32, new: &HalfEdgeUpdate<'_>) -> Result<(), UpdateError> {
+    fn check(&self, update: u32, new: &HalfEdgeUpdate<'_>) -> Result<()> {
         self.check_children(update, Some(update), new.children)?;
         let fields = &self.info.fields;
         let fits = |(residual, bits): (&i32, u32)| residual.unsigned_abs() < 1 << (bits + 1);
@@ -210,7 +206,7 @@ impl HalfEdgeMt {
     /// # Errors
     /// Children must come later, be on the lattice and of no other vertex, and each field has a level and an error. What needs
     /// the mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see to.
-    pub fn push(&mut self, new: &HalfEdgeUpdate<'_>) -> Result<UpdateId, UpdateError> {
+    pub fn push(&mut self, new: &HalfEdgeUpdate<'_>) -> Result<UpdateId> {
         let update = self.updates();
         if update >= self.info.updates {
             return Err(UpdateError::Error { update });
@@ -227,7 +223,7 @@ impl HalfEdgeMt {
     ///
     /// # Errors
     /// If an update is not here.
-    pub fn in_pages(&self, page_bits: u32) -> Result<Self, UpdateError> {
+    pub fn in_pages(&self, page_bits: u32) -> Result<Self> {
         let vertices = (0..self.base.positions.len() as u32).map(VertexId);
         let children: Vec<Vec<ForestChild>> = vertices.map(|v| self.children_of(v).to_vec()).collect();
         let (info, base) = (self.info.clone(), self.base.clone());
@@ -239,7 +235,7 @@ impl HalfEdgeMt {
     }
 
     /// Notes the near vertex of these updates, none of which has another one. As before if one has.
-    fn note_children(&mut self, vertex: u32, children: &[ForestChild]) -> Result<(), UpdateError> {
+    fn note_children(&mut self, vertex: u32, children: &[ForestChild]) -> Result<()> {
         if let Some(child) = children.iter().find(|child| self.near.get(child.update) != NONE) {
             return Err(UpdateError::Vertex { update: child.update, vertex });
         }

@@ -8,6 +8,7 @@ use super::store::VertexTreeMt;
 use super::tree_code::{Label, Tree, facets};
 use crate::geom::{NARROW_BITS, orient3d};
 use crate::mesh::{FACES, NONE};
+use crate::mt::error::Result;
 use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::stars::BARE;
 use crate::mt::vertex::apply::show_built;
@@ -132,12 +133,7 @@ impl VertexTreeMt {
         Some(())
     }
 
-    fn insert(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        cavity: &mut Cavity,
-    ) -> Result<Applied, UpdateError> {
+    fn insert(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Result<Applied> {
         let torn = UpdateError::Cavity { update: u.0 };
         if let Some(parent) = self.missing_parent(mesh, u) {
             return Ok(Applied::Blocked(parent));
@@ -179,12 +175,7 @@ impl VertexTreeMt {
         rebuild(&tree, hole, apexes, &mut cavity.fill)
     }
 
-    fn rebuild(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        cavity: &mut Cavity,
-    ) -> Result<Applied, UpdateError> {
+    fn rebuild(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Result<Applied> {
         self.loops.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity))
     }
 
@@ -237,11 +228,11 @@ impl ApplyUpdates for VertexTreeMt {
         self.loops.may_coarsen(mesh, u)
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         mesh.with_kind_state(|mesh, cavity| self.insert(mesh, u, cavity))
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity);
             if rebuilt == Ok(Applied::Done) {
@@ -252,12 +243,7 @@ impl ApplyUpdates for VertexTreeMt {
         })
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
         mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity);
             if rebuilt == Ok(Applied::Done) {
@@ -272,7 +258,7 @@ impl ApplyUpdates for VertexTreeMt {
         [0; 3]
     }
 
-    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         if self.missing_parent(mesh, u).is_some() {
             return Err(UpdateError::Error { update: u.0 });
         }
@@ -282,7 +268,7 @@ impl ApplyUpdates for VertexTreeMt {
         })
     }
 
-    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError> {
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         mesh.find_star(u, self.vertex(u))
     }
 }

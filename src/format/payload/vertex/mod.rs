@@ -14,6 +14,7 @@ pub(super) mod tests;
 use super::codec::{Codec, Head, InOrder, Parts, Started};
 use super::families::{OWN_FALL, QUARTERINGS};
 use crate::format::coder::{Family, Put, Source};
+use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
 use crate::format::{FormatError, Limits};
@@ -72,7 +73,7 @@ impl Codec for VertexMt {
         _: [u32; 2],
         _: u32,
         _: &Limits,
-    ) -> Result<Box<dyn Head>, FormatError> {
+    ) -> Result<Box<dyn Head>> {
         Ok(Box::new(InsertionRules::read(source)?))
     }
 
@@ -100,7 +101,7 @@ struct InsertionRules {
 }
 
 impl InsertionRules {
-    fn read(source: &mut Source<'_>) -> Result<Self, FormatError> {
+    fn read(source: &mut Source<'_>) -> Result<Self> {
         let always_grows = source.bits(1)? == 1;
         let mut grain = [0; 3];
         for x in &mut grain {
@@ -120,7 +121,7 @@ impl Head for InsertionRules {
         base: BaseMesh,
         block_bits: u32,
         tet_errors: bool,
-    ) -> Result<Started, FormatError> {
+    ) -> Result<Started> {
         let mut mt = VertexMt::growing(info, base, self.always_grows, tet_errors)?;
         let state = State::new(&mt, self.grain)?;
         mt.set_page_bits(block_bits);
@@ -129,13 +130,7 @@ impl Head for InsertionRules {
 }
 
 impl InOrder for State {
-    fn read(
-        &mut self,
-        source: &mut Source<'_>,
-        mt: &mut Mt,
-        count: u32,
-        limits: &Limits,
-    ) -> Result<(), FormatError> {
+    fn read(&mut self, source: &mut Source<'_>, mt: &mut Mt, count: u32, limits: &Limits) -> Result<()> {
         match mt {
             Mt::Vertex(mt) => (1..=count).try_for_each(|k| {
                 read_update(source, mt, self)?;
@@ -200,7 +195,7 @@ fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State)
     Ok(())
 }
 
-fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) -> Result<(), FormatError> {
+fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) -> Result<()> {
     read_errors(source, ERROR, &mut state.errors)?;
     let fan = source.symbol(FAN, 0)? == 1;
     let near = read_one_of(source, state.mesh.positions().len() as u32)?;
@@ -248,7 +243,7 @@ fn put_errors(out: &mut impl Put, family: Family, before: &mut [ErrorCode], erro
 }
 
 /// Turns the errors of the update before into those of the next one.
-fn read_errors(source: &mut Source<'_>, family: Family, errors: &mut [ErrorCode]) -> Result<(), FormatError> {
+fn read_errors(source: &mut Source<'_>, family: Family, errors: &mut [ErrorCode]) -> Result<()> {
     for error in errors {
         let fall = u16::try_from(source.number(family, 0)?);
         let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
@@ -272,7 +267,7 @@ fn read_quarterings(
     source: &mut Source<'_>,
     quarterings: &mut Vec<u8>,
     are_home: impl Iterator<Item = bool>,
-) -> Result<u8, FormatError> {
+) -> Result<u8> {
     let own_fall = source.symbol(OWN_FALL, 0)? as u8;
     quarterings.clear();
     for is_home in are_home {
