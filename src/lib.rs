@@ -139,7 +139,7 @@
 //! | *residual* | a number in a file minus its prediction, which the reader makes, too |
 //! | *offset*, *mask* | of a vertex split: the difference between the two new vertices; which tetrahedra of the star go to which of them |
 //! | *exact values* | the input's values before rounding, at the end of a file |
-//! | *session*, *client* | decoder, MT and current mesh in one ([`Session`](session::Session)); a session that fetches blocks ([`Client`](client::Client)) |
+//! | *session*, *client* | decoder, MT and current mesh in one ([`Session`](session::Session)); a session that fetches blocks ([`Client`](session::Client)) |
 //!
 //! # Conventions
 //!
@@ -149,15 +149,12 @@
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
 
-pub mod client;
 mod coded;
 pub mod format;
 pub mod geom;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
-#[doc(hidden)]
-pub mod remote;
 pub mod session;
 pub mod stream;
 #[doc(hidden)]

@@ -6,11 +6,11 @@ use super::sets::Set;
 use super::surfaces::{Interpolant, Mesh, Surface};
 use std::io::Cursor;
 use std::time::Duration;
-use tetralod::client::{Client, ClientOptions};
+use tetralod::format::DecodeOptions;
 use tetralod::geom::Bounds;
 use tetralod::mt::MtKind;
 use tetralod::refine::{Need, RefineStats, Request};
-use tetralod::session::Session;
+use tetralod::session::{Client, Session};
 use tetralod::stream::FileSource;
 use tetralod_build::Purpose;
 
@@ -60,7 +60,7 @@ pub fn run(sets: &[Set]) -> Result<()> {
 }
 
 fn open(file: &[u8]) -> Result<Reader> {
-    Ok(Client::open(FileSource::new(Cursor::new(file.to_vec()))?, ClientOptions::default())?)
+    Ok(Client::open(FileSource::new(Cursor::new(file.to_vec()))?, DecodeOptions::default(), u64::MAX)?)
 }
 
 /// The isosurface at the middle value, and what it is held against.
@@ -120,7 +120,7 @@ fn picture(set: &Set, name: &str, file: &[u8]) -> Result<String> {
     let mut client = open(file)?;
     let stats = client.refine(&request)?;
     assert!(stats.satisfied && client.session().hash() == whole.hash(), "the same mesh by ranges");
-    let ranges = percent_of(client.fetched(), file);
+    let ranges = percent_of(client.session().fetched(), file);
     let exact = reference.compare(client.session())?;
     let (guaranteed, measured) = in_order(file, &request, &reference, &least)?;
     let measured = measured.map_or("– | – | –".to_owned(), |(share, found)| {
@@ -191,19 +191,19 @@ fn corners(set: &Set, set_name: &str, file: &[u8]) -> Result<Vec<String>> {
         client.request(&Need::within(error).inside(region).into())?;
         let mut rounds = 0;
         let stats = loop {
-            let before = client.fetched();
+            let before = client.session().fetched();
             while !client.fetch(Duration::MAX)? {}
-            rounds += u32::from(client.fetched() > before);
-            let step = client.step(Duration::ZERO, &mut |_| true)?;
-            if step.complete {
-                break step.stats;
+            rounds += u32::from(client.session().fetched() > before);
+            let stats = client.step(Duration::ZERO, &mut |_| true)?;
+            if client.is_complete(&stats) {
+                break stats;
             }
         };
         let updates = client.session().info().map_or(1, |info| info.updates.max(1));
         let progress = client.session().block_progress();
         rows.push(format!(
             "| {set_name} | {name} | {:.1} | {:.1} | {:.1} | {} | {rounds} |",
-            percent_of(client.fetched(), file),
+            percent_of(client.session().fetched(), file),
             100.0 * f64::from(stats.applied) / f64::from(updates),
             100.0 * f64::from(progress.here) / f64::from(progress.blocks.max(1)),
             progress.blocks

@@ -7,12 +7,11 @@ use std::fs::File;
 use std::path::Path;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
-use tetralod::client::{Client, ClientOptions};
-use tetralod::format::Decoder;
+use tetralod::format::{DecodeOptions, Decoder};
 use tetralod::geom::Bounds;
 use tetralod::mt::{MultiTessellation, UpdatePages};
 use tetralod::refine::{Need, Request, View};
-use tetralod::session::Session;
+use tetralod::session::{Client, Session};
 use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, WantedRange};
 
 /// Requests of a walk.
@@ -48,7 +47,7 @@ pub fn run(path: &Path) -> Result<()> {
     let ranges = Rc::new(Cell::new(0));
     let open = |memory: u64| -> Result<Client<Counted>> {
         let source = Counted { file: FileSource::new(File::open(path)?)?, ranges: Rc::clone(&ranges) };
-        Ok(Client::open(source, ClientOptions { memory, ..ClientOptions::default() })?)
+        Ok(Client::open(source, DecodeOptions::default(), memory)?)
     };
     let mut decoder = Decoder::default();
     decoder.feed(&fs::read(path)?)?;
@@ -63,11 +62,11 @@ pub fn run(path: &Path) -> Result<()> {
     for stop in 0..STOPS {
         client.request(&request(client.session(), stop)?)?;
         let stats = loop {
-            let step = client.step(Duration::ZERO, &mut |_| true)?;
+            let stats = client.step(Duration::ZERO, &mut |_| true)?;
             let progress = client.session().block_progress();
             most = most.max(progress.bytes);
-            if step.complete {
-                break step.stats;
+            if client.is_complete(&stats) {
+                break stats;
             }
         };
         client.session().mesh().ok_or("no mesh")?.check()?;
@@ -94,8 +93,8 @@ pub fn run(path: &Path) -> Result<()> {
     println!("| ranges read | {} |", ranges.get());
     println!(
         "| bytes read | {} ({:.1} times the file) |",
-        mega(client.fetched()),
-        client.fetched() as f64 / file_bytes as f64
+        mega(client.session().fetched()),
+        client.session().fetched() as f64 / file_bytes as f64
     );
     println!("| time, with the checks of all meshes | {:.0} s |", start.elapsed().as_secs_f64());
     Ok(())

@@ -7,10 +7,10 @@ use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use tetralod::client::{Client, ClientOptions};
+use tetralod::format::DecodeOptions;
 use tetralod::mesh::RepairLevel;
 use tetralod::mt::{Mt, MtInfo};
-use tetralod::session::Session;
+use tetralod::session::{Client, Session};
 use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, WantedRange};
 use tetralod::stream::{HttpOptions, HttpSource};
 use tetralod_build::verify::Reference;
@@ -253,7 +253,7 @@ pub struct Opened {
 impl Opened {
     /// What a client has.
     pub fn of(client: Client<Bytes>) -> Self {
-        let read = client.arrived();
+        let read = client.session().arrived();
         Self { bytes: client.total().unwrap_or(read), read, session: client.into_session() }
     }
 
@@ -331,7 +331,7 @@ pub fn scheme(path: &Path) -> Option<&str> {
 
 /// Opens an MT file of which only what is needed is read.
 pub fn open_parts(path: &Path) -> Result<Client<Bytes>> {
-    Ok(Client::open(Bytes::of(path)?, ClientOptions::default())?)
+    Ok(Client::open(Bytes::of(path)?, DecodeOptions::default(), u64::MAX)?)
 }
 
 /// Opens an MT file and reads all of it.

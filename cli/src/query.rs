@@ -11,10 +11,10 @@ use serde::Serialize;
 use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tetralod::client::{Client, ClientError, Step};
 use tetralod::format::FormatError;
 use tetralod::mt::{FieldInfo, Mt, MtInfo};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
+use tetralod::session::{Client, ClientError};
 use tetralod_io::{PointValues, PolyData};
 
 /// What the options look like in use.
@@ -170,9 +170,9 @@ impl Query {
         // Which blocks of a half-edge MT are needed shows only while the mesh is refined.
         let mut before = RefineStats::default();
         while client.session().mt().is_some_and(Mt::is_paged) {
-            let Step { stats, complete } = client.step(PATIENCE, &mut go_on)?;
+            let stats = client.step(PATIENCE, &mut go_on)?;
             before.add_work(&stats);
-            if complete || stopped.get() {
+            if client.is_complete(&stats) || stopped.get() {
                 break;
             }
         }

@@ -126,7 +126,7 @@ fn run_samples(arguments: &Arguments, count: u32) -> Result<ExitCode> {
     for sample in &samples {
         let mut client = files::open_parts(file)?;
         client.refine(&sample.request)?;
-        read += client.fetched();
+        read += client.session().fetched();
         let mt = client.session().mt().context("the MT has no base mesh")?;
         whole.add(verify::run_request(mt, &input, sample));
         bar.inc(1);

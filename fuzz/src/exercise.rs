@@ -160,7 +160,7 @@ fn request(byte: u8, info: &MtInfo) -> Request {
 pub fn refine(input: &[u8]) {
     let Some((script, file)) = with_script(input) else { return };
     let file = repaired(file);
-    let mut session = Session::with_limits(limits());
+    let mut session = Session::with_options(DecodeOptions { limits: limits(), ..DecodeOptions::default() });
     let mut requests = script.iter().rev().cycle();
     for (at, piece) in pieces(script, &file).enumerate() {
         let went_on = session.feed(piece).is_ok();

@@ -5,8 +5,7 @@ use super::payload::histogram::Histograms;
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, ErrorCode, Excess, Margins, MtFacts, UpdateError, UpdateId,
-    level_volumes,
+    ApplyUpdates, CurrentMesh, ErrorCode, Excess, Margins, MtFacts, UpdateId, apply_next, level_volumes,
 };
 
 /// What a run through an MT has found.
@@ -89,39 +88,31 @@ fn scan_block(
         ranges: vec![[i32::MAX, i32::MIN]; fields],
         lengths: Vec::new(),
     };
-    let (mut tets, mut vertices) = (Vec::new(), Vec::new());
     for u in updates.map(UpdateId) {
         for (f, error) in block.errors.iter_mut().enumerate() {
             *error = (*error).max(mt.error_of_field(u, f));
         }
-        tets.clear();
-        mt.find_removed(mesh, u, &mut tets).map_err(EncodeError::Update)?;
-        if let Some(excess) = margins.check(mt, mesh, u, &tets)
+        let removed = mt.find_removed(mesh, u).map_err(EncodeError::Update)?;
+        if let Some(excess) = margins.check(mt, mesh, u, &removed)
             && (excess.larger || options.check_margins)
         {
             return Err(out_of_order(excess));
         }
-        widen(&mut block, mesh, &tets, &mut vertices);
-        match mt.refine(mesh, u).map_err(EncodeError::Update)? {
-            Applied::Done => {}
-            Applied::Blocked(_) => return Err(EncodeError::Update(UpdateError::Error { update: u.0 })),
-        }
-        mesh.clear_touched();
-        tets.clear();
-        mt.find_inserted(mesh, u, &mut tets).map_err(EncodeError::Update)?;
-        widen(&mut block, mesh, &tets, &mut vertices);
+        widen(&mut block, mesh, &removed);
+        apply_next(mt, mesh, u).map_err(EncodeError::Update)?;
+        let inserted = mt.find_inserted(mesh, u).map_err(EncodeError::Update)?;
+        widen(&mut block, mesh, &inserted);
     }
     Ok(block)
 }
 
-/// Takes tetrahedra of the mesh into the bounds of a block. `vertices` is scratch space.
-fn widen(block: &mut BlockInfo, mesh: &CurrentMesh, tets: &[u32], vertices: &mut Vec<u32>) {
-    vertices.clear();
-    vertices.extend(tets.iter().filter_map(|&t| mesh.tet(t)).flatten());
+/// Takes tetrahedra of the mesh into the bounds of a block.
+fn widen(block: &mut BlockInfo, mesh: &CurrentMesh, tets: &[u32]) {
+    let mut vertices: Vec<u32> = tets.iter().filter_map(|&t| mesh.tet(t)).flatten().collect();
     // Each is a corner of many.
     vertices.sort_unstable();
     vertices.dedup();
-    for &v in &*vertices {
+    for v in vertices {
         let position = mesh.positions()[v as usize];
         let [low, high] = &mut block.bounds;
         for ((low, high), x) in low.iter_mut().zip(high).zip(position) {

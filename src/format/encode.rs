@@ -58,9 +58,7 @@ fn encode_kind<C: Codec>(
         chain.update(&section.head.crc.to_le_bytes());
     }
     totals.crc = chain.finalize();
-    let mut end = Vec::new();
-    payload::write_end(&mut end, totals);
-    let end = Section::new(Kind::ENDF, end)?;
+    let end = Section::written(Kind::ENDF, |out| payload::write_end(out, totals))?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
     let has_index = mt.info().kind.is_paged();
     put(&header(Start {
@@ -112,9 +110,7 @@ fn sections<C: Codec>(
         for (block, sections) in index.blocks.iter_mut().zip(&of_blocks) {
             block.lengths = sections.iter().map(|section| section.len() as u32).collect();
         }
-        let mut payload = Vec::new();
-        index.write(&mut payload, mt.info());
-        sections.push(Section::new(Kind::INDX, payload)?);
+        sections.push(Section::written(Kind::INDX, |out| index.write(out, mt.info()))?);
     }
     sections.extend(shared);
     sections.extend(of_blocks.into_iter().flatten());
@@ -133,18 +129,12 @@ fn shared_sections<C: Codec>(
 ) -> Result<Vec<Section>, EncodeError> {
     let mut shared = Vec::new();
     if let Some(histograms) = histograms {
-        let mut payload = Vec::new();
-        histograms.write(&mut payload);
-        shared.push(Section::new(Kind::HIST, payload)?);
+        shared.push(Section::written(Kind::HIST, |out| histograms.write(out))?);
     }
     if let Some(bounds) = mt.info().bounds {
-        let mut payload = Vec::new();
-        payload::bounds::write(&mut payload, bounds);
-        shared.push(Section::new(Kind::BOUNDS, payload)?);
+        shared.push(Section::written(Kind::BOUNDS, |out| payload::bounds::write(out, bounds))?);
     }
-    let mut payload = Vec::new();
-    models.write(&mut payload);
-    shared.push(Section::new(Kind::MODL, payload)?);
+    shared.push(Section::written(Kind::MODL, |out| models.write(out))?);
     let mut payload = Vec::new();
     payload::write_base_head(&mut payload, mt);
     let head = payload.len();

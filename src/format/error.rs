@@ -124,3 +124,6 @@ impl crate::Coded for FormatError {
         }
     }
 }
+
+/// What is read of a file.
+pub type Result<T, E = FormatError> = std::result::Result<T, E>;

@@ -1,6 +1,7 @@
 //! Bytes to numbers, every step checked; the counterpart of [`write`](super::write).
 
 use super::FormatError;
+use super::error::Result;
 
 /// Most bytes in a string.
 pub const MAX_STRING: u32 = 65_535;
@@ -11,8 +12,6 @@ pub struct Reader<'a> {
     /// File offset of the first of the remaining bytes.
     offset: u64,
 }
-
-type Result<T> = std::result::Result<T, FormatError>;
 
 impl<'a> Reader<'a> {
     pub fn new(bytes: &'a [u8], offset: u64) -> Self {

@@ -18,6 +18,13 @@ impl Section {
         Ok(Self { head: SectionHead::new(kind, &payload), payload })
     }
 
+    /// A section of what `write` writes.
+    pub fn written(kind: Kind, write: impl FnOnce(&mut Vec<u8>)) -> Result<Self, EncodeError> {
+        let mut payload = Vec::new();
+        write(&mut payload);
+        Self::new(kind, payload)
+    }
+
     /// A section that begins with some bytes, the rest of which is coded.
     pub fn coded(
         kind: Kind,
@@ -25,12 +32,12 @@ impl Section {
         models: &Models,
         put: impl FnOnce(&mut Writer<'_>),
     ) -> Result<Self, EncodeError> {
-        let mut payload = Vec::new();
-        head.iter().for_each(|&number| write::varint(&mut payload, u64::from(number)));
-        let mut writer = Writer::new(models);
-        put(&mut writer);
-        writer.finish(&mut payload);
-        Self::new(kind, payload)
+        Self::written(kind, |payload| {
+            head.iter().for_each(|&number| write::varint(payload, u64::from(number)));
+            let mut writer = Writer::new(models);
+            put(&mut writer);
+            writer.finish(payload);
+        })
     }
 
     /// Bytes with the head.

@@ -47,10 +47,11 @@ impl EdgeMt {
     pub fn from_explicit(explicit: &ExplicitMt) -> Result<Self, ConvertError> {
         let (info, base) = (explicit.info().clone(), explicit.base().clone());
         let mut builder = EdgeMtBuilder::new(info, base).map_err(ReplayError::from)?;
+        let mut field_offsets = Vec::new();
         for u in (0..explicit.updates()).map(UpdateId) {
             let refused = |why| ConvertError::Update { update: u.0, why };
-            let split = as_split(explicit, builder.mt(), u).map_err(refused)?;
-            builder.push(&split.borrowed()).map_err(|error| refused(why_refused(&error)))?;
+            let split = as_split(explicit, builder.mt(), u, &mut field_offsets).map_err(refused)?;
+            builder.push(&split).map_err(|error| refused(why_refused(&error)))?;
         }
         // What a mask makes depends on the mesh, too.
         let mt = builder.finish();
@@ -82,24 +83,13 @@ fn same(a: &ExplicitMt, b: &ExplicitMt, u: UpdateId) -> bool {
     a.removed(u) == b.removed(u) && inserted(a) == inserted(b)
 }
 
-/// A vertex split that owns its parts.
-struct Split {
-    vertex: VertexId,
-    offset: [i32; 3],
-    field_offsets: Vec<i32>,
-    mask: u64,
-    errors: Vec<super::ErrorCode>,
-}
-
-impl Split {
-    fn borrowed(&self) -> VertexSplit<'_> {
-        let Self { vertex, offset, ref field_offsets, mask, ref errors } = *self;
-        VertexSplit { vertex, offset, field_offsets, mask, errors }
-    }
-}
-
-/// Update `u` as a split, from its own tetrahedra; `mt` holds the ones before it.
-fn as_split(explicit: &ExplicitMt, mt: &EdgeMt, u: UpdateId) -> Result<Split, &'static str> {
+/// Update `u` as a split, from its own tetrahedra; `mt` holds the ones before it. `field_offsets` gets those of the levels.
+fn as_split<'a>(
+    explicit: &'a ExplicitMt,
+    mt: &EdgeMt,
+    u: UpdateId,
+    field_offsets: &'a mut Vec<i32>,
+) -> Result<VertexSplit<'a>, &'static str> {
     let removed: Vec<[u32; 4]> = explicit.removed(u).iter().map(|&t| explicit.tets()[t as usize]).collect();
     let range = explicit.inserted(u);
     let inserted = &explicit.tets()[range.start as usize..range.end as usize];
@@ -115,12 +105,13 @@ fn as_split(explicit: &ExplicitMt, mt: &EdgeMt, u: UpdateId) -> Result<Split, &'
     let [near, far] = created;
     let offset = midpoint(&explicit.position(vertex), &explicit.position(near), &explicit.position(far));
     let levels = midpoint(explicit.levels(vertex), explicit.levels(near), explicit.levels(far));
-    let (Some(offset), Some(field_offsets)) = (offset, levels) else {
+    let (Some(offset), Some(levels)) = (offset, levels) else {
         return Err("the vertex that it splits is not half way between those that it creates");
     };
     let offset = [offset[0], offset[1], offset[2]];
     let mask = mask(&removed, inserted, vertex.0, far.0);
-    Ok(Split { vertex, offset, field_offsets, mask, errors: explicit.errors(u).to_vec() })
+    *field_offsets = levels;
+    Ok(VertexSplit { vertex, offset, field_offsets, mask, errors: explicit.errors(u) })
 }
 
 /// The one vertex that all removed tetrahedra have and no inserted one.

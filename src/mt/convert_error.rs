@@ -2,13 +2,18 @@
 
 use super::info::MtKind;
 use super::replay::ReplayError;
-use std::fmt;
+use thiserror::Error;
 
 /// Why an MT cannot be one of another kind.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ConvertError {
     /// The two kinds are made of different updates.
+    #[error(
+        "an MT of kind {} has other updates than one of kind {}: build it again from the mesh",
+        .from.name(),
+        .to.name()
+    )]
     Kinds {
         /// The kind that it is.
         from: MtKind,
@@ -16,6 +21,7 @@ pub enum ConvertError {
         to: MtKind,
     },
     /// An update is not one that the other kind can hold.
+    #[error("update {update} does not fit the other kind: {why}")]
     Update {
         /// The update.
         update: u32,
@@ -23,25 +29,9 @@ pub enum ConvertError {
         why: &'static str,
     },
     /// The MT is damaged.
+    #[error("the MT is damaged: {0}")]
     Damaged(ReplayError),
 }
-
-impl fmt::Display for ConvertError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Kinds { from, to } => write!(
-                f,
-                "an MT of kind {} has other updates than one of kind {}: build it again from the mesh",
-                from.name(),
-                to.name()
-            ),
-            Self::Update { update, why } => write!(f, "update {update} does not fit the other kind: {why}"),
-            Self::Damaged(error) => write!(f, "the MT is damaged: {error}"),
-        }
-    }
-}
-
-impl std::error::Error for ConvertError {}
 
 impl From<ReplayError> for ConvertError {
     fn from(error: ReplayError) -> Self {

@@ -1,6 +1,6 @@
 //! Stored errors, and what can be wrong with an update.
 
-use std::fmt;
+use thiserror::Error;
 
 /// An error bound in 16 bits, rounded up when stored: 0, or from 3 · 10^-8 (2^-25) to 128 in steps of at most 0.05 %.
 ///
@@ -78,10 +78,11 @@ impl ErrorCode {
 }
 
 /// Why an update cannot be stored or applied. Only a damaged or hostile MT leads here.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum UpdateError {
     /// The update splits a vertex that does not exist yet, or that another update splits already.
+    #[error("update {update} splits vertex {vertex}, which is not there to be split")]
     Vertex {
         /// The update.
         update: u32,
@@ -89,105 +90,89 @@ pub enum UpdateError {
         vertex: u32,
     },
     /// A position or a field level leaves its lattice.
+    #[error("update {update} leaves the lattice")]
     OffLattice {
         /// The update.
         update: u32,
     },
     /// What the update inserts does not fit in where it removes something, or it removes what is not there.
+    #[error("update {update} does not fill what it removes, or removes what is not there")]
     Cavity {
         /// The update.
         update: u32,
     },
     /// The mask does not part the star of the vertex into two sides.
+    #[error("update {update} does not part the star of its vertex in two")]
     Mask {
         /// The update.
         update: u32,
     },
     /// The offset is counted from an edge that the link of the vertex does not have.
+    #[error("update {update} names an edge that is not in the link of its vertex")]
     Edge {
         /// The update.
         update: u32,
     },
     /// The update would make a tetrahedron that is flat or turned inside out.
+    #[error("update {update} turns a tetrahedron inside out")]
     Inverted {
         /// The update.
         update: u32,
     },
     /// The star of the vertex is larger than an update can describe, or does not hang together through faces.
+    #[error("update {update} meets a star of more than 64 tetrahedra or 32 vertices, or in parts")]
     Star {
         /// The update.
         update: u32,
     },
     /// The update arrived, but the mesh that it is applied to was not updated: see
     /// [`updates_arrived`](super::UpdatePages::updates_arrived).
+    #[error("update {update} has arrived, but not in the mesh: call updates_arrived first")]
     UnknownToMesh {
         /// The update.
         update: u32,
     },
     /// The update is not here.
+    #[error("update {update} is not here")]
     Missing {
         /// The update.
         update: u32,
     },
     /// The update depends on one that comes later, or has not an error for each field.
+    #[error("update {update} does not come after those it depends on, or lacks errors")]
     Error {
         /// The update.
         update: u32,
     },
 }
 
-impl fmt::Display for UpdateError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Vertex { update, vertex } => {
-                write!(f, "update {update} splits vertex {vertex}, which is not there to be split")
-            }
-            Self::OffLattice { update } => write!(f, "update {update} leaves the lattice"),
-            Self::Cavity { update } => {
-                write!(f, "update {update} does not fill what it removes, or removes what is not there")
-            }
-            Self::Mask { update } => write!(f, "update {update} does not part the star of its vertex in two"),
-            Self::Edge { update } => {
-                write!(f, "update {update} names an edge that is not in the link of its vertex")
-            }
-            Self::Inverted { update } => write!(f, "update {update} turns a tetrahedron inside out"),
-            Self::Star { update } => write!(
-                f,
-                "update {update} meets a star of more than 64 tetrahedra or 32 vertices, or in parts"
-            ),
-            Self::Missing { update } => write!(f, "update {update} is not here"),
-            Self::UnknownToMesh { update } => {
-                write!(f, "update {update} has arrived, but not in the mesh: call updates_arrived first")
-            }
-            Self::Error { update } => {
-                write!(f, "update {update} does not come after those it depends on, or lacks errors")
-            }
-        }
-    }
-}
-
-impl std::error::Error for UpdateError {}
+/// What comes of an update.
+pub(in crate::mt) type Result<T, E = UpdateError> = std::result::Result<T, E>;
 
 /// Why a page of updates cannot come or go; the MT is as it was.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum PageError {
     /// The MT has no such page.
+    #[error("there is no page {page}")]
     Beyond {
         /// The page.
         page: u32,
     },
     /// The page is here already.
+    #[error("page {page} is here already")]
     Present {
         /// The page.
         page: u32,
     },
     /// The page is not here.
+    #[error("page {page} is not here")]
     Absent {
         /// The page.
         page: u32,
     },
     /// The page has another number of updates.
+    #[error("page {page} has {expected} updates, no other number")]
     Length {
         /// The page.
         page: u32,
@@ -195,29 +180,8 @@ pub enum PageError {
         expected: u32,
     },
     /// One of the updates cannot be stored.
-    Update(UpdateError),
-}
-
-impl fmt::Display for PageError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Beyond { page } => write!(f, "there is no page {page}"),
-            Self::Present { page } => write!(f, "page {page} is here already"),
-            Self::Absent { page } => write!(f, "page {page} is not here"),
-            Self::Length { page, expected } => {
-                write!(f, "page {page} has {expected} updates, no other number")
-            }
-            Self::Update(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for PageError {}
-
-impl From<UpdateError> for PageError {
-    fn from(error: UpdateError) -> Self {
-        Self::Update(error)
-    }
+    #[error(transparent)]
+    Update(#[from] UpdateError),
 }
 
 #[cfg(test)]

@@ -168,9 +168,7 @@ impl MtInfo {
         };
         self.fields.get(field).map_or(moved, |f| moved.max(f.quantization / f.range()))
     }
-}
 
-impl MtInfo {
     /// The smallest and the largest value of a field over all of its time steps, which are the fields of its name: what means the
     /// same at all times.
     ///

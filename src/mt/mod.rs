@@ -93,8 +93,10 @@ pub use mesh::current::{CurrentMesh, MeshChanges};
 pub use mesh::limits::{MAX_LINK, MAX_STAR};
 pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
+pub(crate) use pages::updates_of_page;
 #[doc(hidden)]
 pub use replay::ReplayError;
+pub(crate) use replay::apply_next;
 #[doc(hidden)]
 pub use replay::canonical;
 #[doc(hidden)]

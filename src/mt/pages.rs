@@ -10,6 +10,12 @@ use std::ops::Range;
 /// A page has at most 2 to this power of updates.
 const MAX_PAGE_BITS: u32 = 16;
 
+/// The updates of a page of `2^bits` of an MT of so many; none if there is no such page.
+pub(crate) fn updates_of_page(bits: u32, page: u32, updates: u32) -> Range<u32> {
+    let (first, end) = (u64::from(page) << bits, u64::from(updates));
+    first.min(end) as u32..(first + (1 << bits)).min(end) as u32
+}
+
 /// Consecutive updates, as their kind stores them.
 pub(super) trait Page {
     fn errors(&self) -> &Errors;
@@ -73,9 +79,7 @@ impl<P: Page> Pages<P> {
 
     /// The updates of page `page`; none if there is no such page.
     pub fn updates_of(&self, page: u32) -> Range<u32> {
-        let first = u64::from(page) << self.bits;
-        let end = u64::from(self.total);
-        first.min(end) as u32..(first + (1 << self.bits)).min(end) as u32
+        updates_of_page(self.bits, page, self.total)
     }
 
     /// The page of update `u`, present or not.

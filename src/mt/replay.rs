@@ -35,27 +35,16 @@ pub(super) fn replay(
 ) -> Result<CurrentMesh, ReplayError> {
     let mut mesh = mt.start()?;
     mt.updates_arrived(&mut mesh, 0);
-    let (mut found, mut parents) = (Vec::new(), Vec::new());
-    let (mut removed, mut inserted) = (Vec::new(), Vec::new());
     for update in (0..mt.updates()).map(UpdateId) {
-        found.clear();
-        mt.find_removed(&mut mesh, update, &mut found)?;
-        removed.clear();
-        removed.extend(found.iter().map(|&t| named(&mesh, t)));
+        let found = mt.find_removed(&mut mesh, update)?;
+        let removed: Vec<[u32; 4]> = found.iter().map(|&t| named(&mesh, t)).collect();
         let quarterings: Vec<u8> = found.iter().map(|&t| mt.quarterings(&mesh, t)).collect();
-        parents.clear();
-        parents.extend(found.iter().filter_map(|&t| mt.creator(&mesh, t)));
+        let mut parents: Vec<UpdateId> = found.iter().filter_map(|&t| mt.creator(&mesh, t)).collect();
         parents.sort_unstable();
         parents.dedup();
-        if let Applied::Blocked(_) = mt.refine(&mut mesh, update)? {
-            // All updates with smaller numbers are applied, and only those can be in the way.
-            return Err(UpdateError::Error { update: update.0 }.into());
-        }
-        mesh.clear_touched();
-        found.clear();
-        mt.find_inserted(&mut mesh, update, &mut found)?;
-        inserted.clear();
-        inserted.extend(found.iter().map(|&t| named(&mesh, t)));
+        apply_next(mt, &mut mesh, update)?;
+        let found = mt.find_inserted(&mut mesh, update)?;
+        let inserted: Vec<[u32; 4]> = found.iter().map(|&t| named(&mesh, t)).collect();
         see(&Step {
             update,
             mesh: &mesh,
@@ -66,6 +55,23 @@ pub(super) fn replay(
         });
     }
     Ok(mesh)
+}
+
+/// Applies an update to a mesh that has all with smaller numbers on which it depends.
+///
+/// # Errors
+/// If it cannot be applied.
+pub(crate) fn apply_next(
+    mt: &impl ApplyUpdates,
+    mesh: &mut CurrentMesh,
+    update: UpdateId,
+) -> Result<(), UpdateError> {
+    if let Applied::Blocked(_) = mt.refine(mesh, update)? {
+        // Only updates with smaller numbers can be in the way.
+        return Err(UpdateError::Error { update: update.0 });
+    }
+    mesh.clear_touched();
+    Ok(())
 }
 
 /// The vertex numbers of tetrahedron `t`, ascending but for the last two, which are swapped if that is what it takes

@@ -5,6 +5,7 @@ use super::ids::{Applied, UpdateId};
 use super::info::MtInfo;
 use super::mesh::base::{BaseMesh, BaseMeshError};
 use super::mesh::current::CurrentMesh;
+use super::pages::updates_of_page;
 use enum_dispatch::enum_dispatch;
 use std::ops::Range;
 
@@ -94,9 +95,7 @@ pub trait UpdatePages: MultiTessellation {
 
     /// The updates of page `page`, which come and go together; none if there is no such page.
     fn page_updates(&self, page: u32) -> Range<u32> {
-        let first = u64::from(page) << self.page_bits();
-        let end = u64::from(self.info().updates);
-        first.min(end) as u32..(first + (1 << self.page_bits())).min(end) as u32
+        updates_of_page(self.page_bits(), page, self.info().updates)
     }
 
     /// Declares that no update which is still to come has larger errors than these, by field; until then, any may come. Without
@@ -186,27 +185,17 @@ pub trait ApplyUpdates: UpdatePages {
     /// The update that created tetrahedron `t` of the current mesh in refinement; none if it is of the base mesh.
     fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId>;
 
-    /// Appends the tetrahedra that `u+` removes from a mesh that contains all parents of `u`, but not `u`.
+    /// The tetrahedra that `u+` removes from a mesh that contains all parents of `u`, but not `u`.
     ///
     /// # Errors
     /// If the MT is damaged, or the mesh is another one.
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError>;
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError>;
 
-    /// Appends the tetrahedra that `u+` inserted into a mesh that contains `u` and none of its children.
+    /// The tetrahedra that `u+` inserted into a mesh that contains `u` and none of its children.
     ///
     /// # Errors
     /// If the MT is damaged, or the mesh is another one.
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError>;
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>, UpdateError>;
 
     /// Whether all that `u+` created is still in the mesh, as far as its labels show.
     /// False means that some child of `u` is applied, or `u` is not.

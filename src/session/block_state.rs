@@ -1,24 +1,30 @@
 //! What a session has of the blocks of a file elsewhere, and what it plans to have.
 
-use super::pieces::Pieces;
 use crate::refine::Criterion;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The blocks of a session.
-#[derive(Debug)]
+/// The blocks of a session; nothing of one that is fed from front to back.
+#[derive(Debug, Default)]
 pub(super) struct Blocks {
+    /// Whether the file comes in parts.
+    pub in_parts: bool,
     /// Bytes that blocks may take in memory.
     pub memory: u64,
     /// How far the file has been read in order.
     pub fed: u64,
+    /// Bytes that have come, those that came again counted again.
+    pub fetched: u64,
+    /// What has come, in ascending order; no two of these meet.
+    pub arrived: Vec<Range<u64>>,
     /// What has come of blocks that are not complete, by where it begins.
-    pub pieces: Pieces,
+    pub pieces: BTreeMap<u64, Vec<u8>>,
     /// The beginning of a range of a block, and where that begins: it came with what stands in front of the blocks.
     pub beginning: Option<(u64, Vec<u8>)>,
     /// Complete blocks that wait for others, by number.
-    pub waiting: Pieces,
+    pub waiting: BTreeMap<u32, Vec<u8>>,
     /// What is to be here, most important first, as far as there is memory for it.
     pub plan: Vec<(f64, u32)>,
     pub needed: u32,
@@ -33,25 +39,33 @@ pub(super) struct Blocks {
 impl Blocks {
     /// No blocks yet, which may take so many bytes in memory.
     pub fn new(memory: u64) -> Self {
-        Self {
-            memory,
-            fed: 0,
-            pieces: Pieces::default(),
-            beginning: None,
-            waiting: Pieces::default(),
-            plan: Vec::new(),
-            needed: 0,
-            left_out: 0,
-            last_needed: Vec::new(),
-            plans: 0,
-            criterion: None,
+        Self { in_parts: true, memory, ..Self::default() }
+    }
+
+    /// Notes that so many bytes have come from `start` on.
+    pub fn arrive(&mut self, start: u64, bytes: usize) {
+        if bytes == 0 {
+            return;
         }
+        self.fetched += bytes as u64;
+        let new = start..start.saturating_add(bytes as u64);
+        let first = self.arrived.partition_point(|range| range.end < new.start);
+        let behind = self.arrived.partition_point(|range| range.start <= new.end);
+        let meets = self.arrived[first..behind].iter();
+        let whole = meets.fold(new, |whole, range| whole.start.min(range.start)..whole.end.max(range.end));
+        self.arrived.splice(first..behind, [whole]);
+    }
+
+    /// Bytes that have come, each counted once.
+    pub fn arrived_bytes(&self) -> u64 {
+        self.arrived.iter().map(|range| range.end - range.start).sum()
     }
 
     /// Bytes of what waits to be put together.
     pub fn bytes_beside(&self) -> u64 {
-        let beginning = self.beginning.as_ref().map_or(0, |(_, bytes)| bytes.len() as u64);
-        self.pieces.bytes() + self.waiting.bytes() + beginning
+        let beginning = self.beginning.as_ref().map(|(_, bytes)| bytes);
+        let all = self.pieces.values().chain(self.waiting.values()).chain(beginning);
+        all.map(|bytes| bytes.len() as u64).sum()
     }
 
     /// What is missing of a range of a block.
@@ -83,5 +97,22 @@ impl Blocks {
                 self.beginning = Some((range.start, come));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_that_come_again_are_counted_once() {
+        let mut blocks = Blocks::new(0);
+        for (start, bytes, arrived) in
+            [(10, 5, 5), (0, 2, 7), (12, 8, 12), (2, 8, 20), (0, 20, 20), (30, 0, 20), (29, 3, 23)]
+        {
+            blocks.arrive(start, bytes);
+            assert_eq!(blocks.arrived_bytes(), arrived, "{start} {bytes}");
+        }
+        assert_eq!(blocks.fetched, 46);
     }
 }

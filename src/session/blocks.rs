@@ -6,21 +6,12 @@
 
 use super::Session;
 use super::block_state::Blocks;
-use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
+use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index};
 use crate::geom::Bounds;
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front};
+use crate::stream::{Loader, WantedRange};
 use std::ops::Range;
-use std::sync::Arc;
-
-/// Bytes of a file that are wanted.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WantedBytes {
-    /// Which ones. They may reach beyond the end of the file.
-    pub range: Range<u64>,
-    /// How much: the more the block lowers the excess of the error for each of its bytes, the higher.
-    pub priority: f64,
-}
 
 /// How a session that keeps blocks stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,25 +59,30 @@ impl Session {
     /// in blocks (see [`MtKind::is_paged`](crate::mt::MtKind::is_paged)) are wanted as a whole.
     pub fn in_parts(options: DecodeOptions, memory: u64) -> Self {
         let decoder = Decoder::new(DecodeOptions { in_parts: true, ..options });
-        Self { decoder, blocks: Some(Blocks::new(memory)), ..Self::default() }
+        Self { decoder, blocks: Blocks::new(memory), ..Self::default() }
     }
 
-    /// Which bytes of the file are wanted next, most important first; none when all is here that the request needs. Only for
-    /// sessions [in parts](Session::in_parts).
-    pub fn wanted(&self) -> Vec<WantedBytes> {
-        let Some(blocks) = &self.blocks else { return Vec::new() };
-        if let Some(end) = self.head_missing(blocks) {
-            return vec![WantedBytes { range: blocks.fed..end, priority: f64::MAX }];
+    /// Which bytes of the file are wanted next, most important first: the more a block lowers the excess of the error for each of
+    /// its bytes. They may reach beyond the end of the file. None when all is here that the request needs. Only for sessions
+    /// [in parts](Session::in_parts).
+    pub fn wanted(&self) -> Vec<WantedRange> {
+        let blocks = &self.blocks;
+        if !blocks.in_parts {
+            return Vec::new();
+        }
+        if let Some(end) = self.head_missing() {
+            return vec![WantedRange { range: blocks.fed..end, priority: f32::INFINITY }];
         }
         let Some(mt) = self.decoder.mt().filter(|mt| mt.is_paged()) else { return Vec::new() };
         let mut wanted = Vec::new();
         for &(priority, block) in &blocks.plan {
-            if mt.has_page(block) || blocks.waiting.has(block.into()) {
+            let priority = priority as f32;
+            if mt.has_page(block) || blocks.waiting.contains_key(&block) {
                 continue;
             }
             let ranges = self.decoder.block_ranges(block).into_iter();
-            let missing = ranges.filter(|range| !blocks.pieces.has(range.start));
-            wanted.extend(missing.map(|range| WantedBytes { range: blocks.rest_of(range), priority }));
+            let missing = ranges.filter(|range| !blocks.pieces.contains_key(&range.start));
+            wanted.extend(missing.map(|range| WantedRange { range: blocks.rest_of(range), priority }));
         }
         wanted
     }
@@ -109,63 +105,104 @@ impl Session {
     }
 
     /// Up to where the file is still to be read in order; none when that is done.
-    fn head_missing(&self, blocks: &Blocks) -> Option<u64> {
+    fn head_missing(&self) -> Option<u64> {
+        let fed = self.blocks.fed;
         let is_paged = self.decoder.info().is_none_or(|info| info.kind.is_paged());
         if !is_paged {
-            return (!self.decoder.progress().complete).then_some(blocks.fed + LATER_BYTES);
+            return (!self.decoder.progress().complete).then_some(fed + LATER_BYTES);
         }
         match self.decoder.head_end() {
-            Some(end) if blocks.fed >= end => None,
+            Some(end) if fed >= end => None,
             Some(end) => Some(end),
-            None => Some(blocks.fed + FIRST_BYTES),
+            None => Some(fed + FIRST_BYTES),
         }
     }
 
     /// Whether more is to come of the file, if all goes well: anything that the request needs, or the rest of a file that comes
     /// from front to back.
     pub fn is_waiting(&self) -> bool {
-        if self.blocks.is_some() { !self.wanted().is_empty() } else { !self.progress().complete }
+        if self.blocks.in_parts { !self.wanted().is_empty() } else { !self.progress().complete }
     }
 
-    /// Takes in bytes that were [wanted](Session::wanted): exactly one of the ranges, or less of it at the end of the file.
+    /// Bytes of the file that have come, those that came again counted again.
+    pub fn fetched(&self) -> u64 {
+        if self.blocks.in_parts { self.blocks.fetched } else { self.decoder.progress().bytes }
+    }
+
+    /// Bytes of the file that have come, each counted once: never more than it has.
+    pub fn arrived(&self) -> u64 {
+        if self.blocks.in_parts { self.blocks.arrived_bytes() } else { self.decoder.progress().bytes }
+    }
+
+    /// Takes in a range that was [wanted](Session::wanted), with its bytes: fewer where it reaches beyond the end of the file.
     /// Bytes that are not wanted any more are ignored.
     ///
     /// # Errors
-    /// When the bytes are damaged. What was there before stays usable.
-    pub fn take(&mut self, start: u64, bytes: &[u8]) -> Result<Progress, FormatError> {
-        let Some(blocks) = &self.blocks else { return Ok(self.progress()) };
-        if self.head_missing(blocks).is_some() {
-            if start == blocks.fed {
+    /// If the bytes are damaged, or end where more is needed. What was there before stays usable.
+    pub fn take(&mut self, range: &Range<u64>, bytes: &[u8]) -> Result<(), FormatError> {
+        if !self.blocks.in_parts {
+            return Ok(());
+        }
+        self.blocks.arrive(range.start, bytes.len());
+        self.take_from(range.start, bytes)?;
+        let is_short = (bytes.len() as u64) < range.end - range.start;
+        // At the end of a sound file nothing more is wanted.
+        if is_short && self.wanted().iter().any(|wanted| wanted.range.start == range.start) {
+            return Err(FormatError::Truncated { offset: range.start + bytes.len() as u64 });
+        }
+        Ok(())
+    }
+
+    /// Takes all complete ranges of `loader`, and gives it those that are wanted then; whether there was any.
+    ///
+    /// # Errors
+    /// As [`Session::take`]; nothing is wanted then until the next call.
+    pub fn supply(&mut self, loader: &mut Loader) -> Result<bool, FormatError> {
+        let mut any = false;
+        loop {
+            while let Some((range, bytes)) = loader.take() {
+                any = true;
+                // What else has come may be as damaged.
+                self.take(&range, &bytes).inspect_err(|_| loader.drop_all())?;
+            }
+            loader.want(&self.wanted());
+            // What is held for other ranges may make new ones complete.
+            if !loader.has_complete() {
+                return Ok(any);
+            }
+        }
+    }
+
+    fn take_from(&mut self, start: u64, bytes: &[u8]) -> Result<(), FormatError> {
+        if self.head_missing().is_some() {
+            if start == self.blocks.fed {
                 let end = start + bytes.len() as u64;
                 self.feed(bytes)?;
-                if let Some(blocks) = &mut self.blocks {
-                    let is_done = self.decoder.takes_blocks();
-                    blocks.fed =
-                        self.decoder.head_end().filter(|_| is_done).map_or(end, |head| head.max(start));
-                }
+                let head = self.decoder.head_end().filter(|_| self.decoder.takes_blocks());
+                self.blocks.fed = head.map_or(end, |head| head.max(start));
                 self.plan();
                 self.take_surplus(start, bytes)?;
             }
-            return Ok(self.progress());
+            return Ok(());
         }
-        let (start, bytes) = blocks.with_beginning(start, bytes);
-        let Some(block) = self.decoder.block_at(start) else { return Ok(self.progress()) };
+        let (start, bytes) = self.blocks.with_beginning(start, bytes);
+        let Some(block) = self.decoder.block_at(start) else { return Ok(()) };
         let ranges = self.decoder.block_ranges(block);
         let fits = ranges.iter().any(|range| range.start == start && range.end - start == bytes.len() as u64);
         let is_here = self.decoder.mt().is_some_and(|mt| mt.has_page(block));
         if !fits || is_here {
-            return Ok(self.progress());
+            return Ok(());
         }
-        let Some(blocks) = &mut self.blocks else { return Ok(self.progress()) };
+        let blocks = &mut self.blocks;
         blocks.pieces.insert(start, bytes.to_vec());
         blocks.beginning.take_if(|(at, _)| *at == start);
-        if ranges.iter().all(|range| blocks.pieces.has(range.start)) {
+        if ranges.iter().all(|range| blocks.pieces.contains_key(&range.start)) {
             let parts: Vec<Vec<u8>> =
-                ranges.iter().filter_map(|range| blocks.pieces.remove(range.start)).collect();
-            blocks.waiting.insert(block.into(), parts.concat());
+                ranges.iter().filter_map(|range| blocks.pieces.remove(&range.start)).collect();
+            blocks.waiting.insert(block, parts.concat());
             self.insert_waiting()?;
         }
-        Ok(self.progress())
+        Ok(())
     }
 
     /// Whole blocks may have come with what stands in front of them.
@@ -178,25 +215,18 @@ impl Session {
         loop {
             let ranges = self.decoder.block_ranges(block);
             if !ranges.last().is_some_and(|last| last.end <= end && ranges[0].start >= head.max(start)) {
-                if let (Some(blocks), Some(first)) = (&mut self.blocks, ranges.first())
-                    && first.start >= head.max(start)
-                {
-                    blocks.keep_beginning(&ranges, start, bytes);
+                if ranges.first().is_some_and(|first| first.start >= head.max(start)) {
+                    self.blocks.keep_beginning(&ranges, start, bytes);
                 }
                 return Ok(());
             }
             let part =
                 |range: &Range<u64>| &bytes[(range.start - start) as usize..(range.end - start) as usize];
             let whole: Vec<u8> = ranges.iter().flat_map(part).copied().collect();
-            if let Some(blocks) = &mut self.blocks {
-                blocks.waiting.insert(block.into(), whole);
-            }
+            self.blocks.waiting.insert(block, whole);
             self.insert_waiting()?;
             // A block that no request needs does not wait for memory.
-            if let Some(blocks) = &mut self.blocks
-                && blocks.criterion.is_none()
-                && blocks.waiting.remove(block.into()).is_some()
-            {
+            if self.blocks.criterion.is_none() && self.blocks.waiting.remove(&block).is_some() {
                 return Ok(());
             }
             block += 1;
@@ -205,7 +235,7 @@ impl Session {
 
     /// Puts complete blocks into the MT, as far as there is memory for them.
     fn insert_waiting(&mut self) -> Result<(), FormatError> {
-        while let Some(block) = self.next_complete() {
+        while let Some(&block) = self.blocks.waiting.keys().next() {
             if !self.has_memory_for(block) {
                 self.free_memory();
             }
@@ -213,7 +243,7 @@ impl Session {
                 // When the mesh has followed the request, more can go.
                 break;
             }
-            let bytes = self.blocks.as_mut().and_then(|blocks| blocks.waiting.remove(block.into()));
+            let bytes = self.blocks.waiting.remove(&block);
             self.decoder.take_block(block, &bytes.unwrap_or_default())?;
             if let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) {
                 front.page_inserted(mt, block);
@@ -224,19 +254,14 @@ impl Session {
 
     /// Whether a block can come without anything going.
     fn has_memory_for(&self, block: u32) -> bool {
-        let (Some(blocks), Some(mt)) = (&self.blocks, self.decoder.mt()) else { return false };
-        mt.page_bytes() + mt.bytes_of_page(block) <= blocks.memory
-    }
-
-    /// The first block that is complete and waits.
-    fn next_complete(&self) -> Option<u32> {
-        self.blocks.as_ref()?.waiting.numbers().next().map(|block| block as u32)
+        let fits = |mt: &Mt| mt.page_bytes() + mt.bytes_of_page(block) <= self.blocks.memory;
+        self.decoder.mt().is_some_and(fits)
     }
 
     /// How the blocks stand.
     pub fn block_progress(&self) -> BlockProgress {
-        let paged = self.decoder.mt().filter(|mt| mt.is_paged());
-        let (Some(blocks), Some(mt)) = (&self.blocks, paged) else { return BlockProgress::default() };
+        let (blocks, paged) = (&self.blocks, self.decoder.mt().filter(|mt| mt.is_paged()));
+        let Some(mt) = paged.filter(|_| blocks.in_parts) else { return BlockProgress::default() };
         let count = self.decoder.index().map_or(0, |index| index.blocks.len() as u32);
         let without_memory = blocks.waiting.len() as u32;
         BlockProgress {
@@ -268,21 +293,13 @@ impl Session {
         blocks.map(|(block, info)| MappedBlock { bounds: bounds(info.bounds), state: state(block) }).collect()
     }
 
-    /// The request is another one. What it needs is worked out when the mesh has moved: what a mesh that was made for another request
-    /// asks for may not be needed.
-    pub(super) fn plan_for(&mut self, criterion: Arc<dyn Criterion>) {
-        if let Some(blocks) = &mut self.blocks {
-            blocks.criterion = Some(criterion);
-        }
-    }
-
     /// Works out which blocks the request needs.
     fn plan(&mut self) {
-        let (Some(blocks), Some(index)) = (&mut self.blocks, self.decoder.index()) else { return };
-        let (Some(mt), Some(criterion), Some(front)) = (self.decoder.mt(), &blocks.criterion, &self.front)
+        let (blocks, Some(index), Some(mt)) = (&mut self.blocks, self.decoder.index(), self.decoder.mt())
         else {
             return;
         };
+        let (Some(criterion), Some(front)) = (&blocks.criterion, &self.front) else { return };
         blocks.plans += 1;
         blocks.last_needed.resize(index.blocks.len(), 0);
         let fields = self.decoder.wanted_fields();
@@ -304,14 +321,14 @@ impl Session {
         blocks.left_out = blocks.needed - plan.len() as u32;
         blocks.plan = plan;
         let is_planned = |block: u32| blocks.plan.iter().any(|&(_, planned)| planned == block);
-        blocks.waiting.retain(|block| is_planned(block as u32));
+        blocks.waiting.retain(|&block, _| is_planned(block));
         let decoder = &self.decoder;
-        blocks.pieces.retain(|start| decoder.block_at(start).is_some_and(is_planned));
+        blocks.pieces.retain(|&start, _| decoder.block_at(start).is_some_and(is_planned));
     }
 
     /// The mesh has moved: what it does not need any more may go, and what waited for that may come.
     pub(super) fn after_step(&mut self) -> Result<(), FormatError> {
-        if self.blocks.is_some() {
+        if self.blocks.in_parts {
             // The mesh shows now what else it needs.
             self.plan();
             self.free_memory();
@@ -337,17 +354,15 @@ impl Session {
     /// As many blocks as have to go, those first that have not been needed for longest. Those of which an update is applied stay.
     fn blocks_to_drop(&self) -> Vec<u32> {
         let mut leaving = Vec::new();
-        let (Some(blocks), Some(mt), Some(index)) = (&self.blocks, self.decoder.mt(), self.decoder.index())
-        else {
-            return leaving;
-        };
+        let (Some(mt), Some(index)) = (self.decoder.mt(), self.decoder.index()) else { return leaving };
+        let blocks = &self.blocks;
         let coming = blocks.plan.iter().filter(|(_, block)| !mt.has_page(*block));
         let coming: u64 = coming.map(|&(_, block)| mt.bytes_of_page(block)).sum();
         let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.memory);
         if excess == 0 {
             return leaving;
         }
-        for block in self.unneeded(blocks, mt, index) {
+        for block in self.unneeded(mt, index) {
             if excess == 0 {
                 break;
             }
@@ -361,7 +376,8 @@ impl Session {
     }
 
     /// The blocks here that the request does not need, those first that have not been needed for longest.
-    fn unneeded(&self, blocks: &Blocks, mt: &Mt, index: &Index) -> Vec<u32> {
+    fn unneeded(&self, mt: &Mt, index: &Index) -> Vec<u32> {
+        let blocks = &self.blocks;
         let mut is_needed = vec![false; index.blocks.len()];
         blocks.plan.iter().for_each(|&(_, block)| is_needed[block as usize] = true);
         // Blocks are asked for one by one; what they have shown must not be forgotten.

@@ -6,7 +6,7 @@
 //! the same as in the whole MT. Depths never change, so this is done only for meshes with updates that no
 //! mesh before had.
 
-use crate::mt::{Applied, ApplyUpdates, ReplayError, UpdateError, UpdateId};
+use crate::mt::{ApplyUpdates, ReplayError, UpdateId, apply_next};
 use crate::refine::Front;
 
 /// Depths of updates.
@@ -35,17 +35,11 @@ impl Depths {
         }
         let mut mesh = mt.start()?;
         mt.updates_arrived(&mut mesh, 0);
-        let mut removed = Vec::new();
         for u in (0..mt.updates()).map(UpdateId).filter(|u| front.contains(*u)) {
-            removed.clear();
-            mt.find_removed(&mut mesh, u, &mut removed)?;
+            let removed = mt.find_removed(&mut mesh, u)?;
             let above = removed.iter().map(|&t| self.get(mt.creator(&mesh, t))).max();
             self.of[u.0 as usize] = above.unwrap_or(0) + 1;
-            if let Applied::Blocked(_) = mt.refine(&mut mesh, u)? {
-                // All that it depends on is applied, and has a smaller number.
-                return Err(UpdateError::Error { update: u.0 }.into());
-            }
-            mesh.clear_touched();
+            apply_next(mt, &mut mesh, u)?;
         }
         Ok(())
     }

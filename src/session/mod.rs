@@ -4,6 +4,18 @@
 //! [`Session::view`] or as a surface with [`Session::isosurface`]. Everything works while the file is still
 //! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
 //!
+//! ```text
+//!            request ──▶ Session ──▶ wanted: ranges of bytes, by importance
+//!   mesh, stats ◀── step    ▲
+//!                           │ take: ranges that are complete
+//!                         Loader ◀── responses, pieces of bytes, failures ── fetch, sockets
+//!                           └─────▶ what to fetch, cancel, read from a cache, or wait for
+//! ```
+//!
+//! Whoever has the bytes only moves them: a [`Client`] from any source; a page, or Node, from `fetch`, whose pieces of bytes go to a
+//! [`Loader`](crate::stream::Loader), which joins ranges, tries again and notices other versions of the file, and from there to the
+//! session without another copy outside ([`Session::supply`]).
+//!
 //! Of a file elsewhere a session plans which blocks to fetch: those that the mesh asks for, or for uniform requests those with errors beyond
 //! what is allowed, the largest excess of error per byte first, as far as memory allows (`blocks`). When memory is short, blocks that the
 //! request does not need are evicted, those first that have not been needed for the longest time. A block with an applied update stays.
@@ -11,19 +23,20 @@
 mod behind;
 mod block_state;
 mod blocks;
+mod client;
 mod depths;
-mod pieces;
 mod quantity;
 mod reading;
 
 #[doc(hidden)]
-pub use blocks::{BlockProgress, BlockState, MappedBlock, WantedBytes};
+pub use blocks::{BlockProgress, BlockState, MappedBlock};
+pub use client::{Client, ClientError};
 #[doc(hidden)]
 pub use quantity::TetQuantity;
 #[doc(hidden)]
 pub use reading::Reading;
 
-use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError, Limits};
+use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError};
 use crate::geom::Bounds;
 use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTessellation};
 use crate::refine::{
@@ -70,8 +83,7 @@ pub struct Session {
     decoder: Decoder,
     /// There from the moment the base mesh is.
     front: Option<Front>,
-    /// For a file that comes in parts.
-    blocks: Option<Blocks>,
+    blocks: Blocks,
     failed: Option<FormatError>,
     /// What was asked for last.
     request: Request,
@@ -103,11 +115,6 @@ impl Session {
     /// A session that waits for the first byte of a file.
     pub fn new() -> Self {
         Self::default()
-    }
-
-    /// [`Session::new`] with other limits than the default ones.
-    pub fn with_limits(limits: Limits) -> Self {
-        Self::with_options(DecodeOptions { limits, ..DecodeOptions::default() })
     }
 
     /// [`Session::new`] with other options than the default ones.
@@ -221,7 +228,8 @@ impl Session {
         let criterion: Arc<dyn Criterion> = Arc::new(criterion);
         front.request(mt, Arc::clone(&criterion), request.budget);
         self.request.clone_from(request);
-        self.plan_for(criterion);
+        // What it needs is worked out when the mesh has moved: what a mesh that was made for another request asks for may not be needed.
+        self.blocks.criterion = Some(criterion);
         Ok(())
     }
 
@@ -387,6 +395,9 @@ impl Session {
     /// # Errors
     /// As [`Decoder::take_exact`].
     pub fn take_exact(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
+        if let Some(range) = self.exact_range() {
+            self.blocks.arrive(range.start, bytes.len());
+        }
         self.decoder.take_exact(bytes)
     }
 

@@ -45,8 +45,7 @@ fn the_index_tells_the_truth() {
             let info = &index.blocks[u.0 as usize >> 4];
             let largest = (0..mt.info().fields.len()).all(|f| mt.error_of_field(u, f) <= info.errors[f]);
             assert!(largest, "{u:?}");
-            let mut tets = Vec::new();
-            mt.find_removed(&mut mesh, u, &mut tets).expect("a valid MT");
+            let tets = mt.find_removed(&mut mesh, u).expect("a valid MT");
             let inside = |mesh: &CurrentMesh, tets: &[u32]| {
                 tets.iter().filter_map(|&t| mesh.tet(t)).flatten().all(|v| {
                     let p = mesh.positions()[v as usize];
@@ -57,8 +56,7 @@ fn the_index_tells_the_truth() {
             };
             assert!(inside(&mesh, &tets), "{u:?}");
             assert_eq!(mt.refine(&mut mesh, u), Ok(Applied::Done));
-            tets.clear();
-            mt.find_inserted(&mut mesh, u, &mut tets).expect("a valid MT");
+            let tets = mt.find_inserted(&mut mesh, u).expect("a valid MT");
             assert!(inside(&mesh, &tets), "{u:?}");
         }
     }

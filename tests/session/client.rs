@@ -5,13 +5,11 @@ use std::cell::Cell;
 use std::io::Cursor;
 use std::rc::Rc;
 use std::time::Duration;
-use tetralod::client::{Client, ClientError, ClientOptions};
 use tetralod::format::{DecodeOptions, EncodeOptions, FormatError, encode};
 use tetralod::geom::Bounds;
 use tetralod::mt::{MtKind, MultiTessellation, UpdatePages};
 use tetralod::refine::{Need, Request};
-use tetralod::remote::Remote;
-use tetralod::session::Session;
+use tetralod::session::{Client, ClientError, Session};
 use tetralod::stream::{
     Action, Arrived, FileSource, Loader, LoaderOptions, RangeSource, ResponseHead, StreamError, WantedRange,
 };
@@ -80,7 +78,7 @@ fn meshes_and_bounds_are_those_of_the_whole_file() {
         let mut whole = Session::new();
         whole.feed(&file).expect("a sound file");
         let (source, given) = Counted::new(&file);
-        let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+        let mut client = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
         let first = given.get();
         assert!(!kind.is_paged() || first < file.len() as u64, "the base mesh is not the whole file");
         for request in requests() {
@@ -93,7 +91,7 @@ fn meshes_and_bounds_are_those_of_the_whole_file() {
             // What has not come may have any error that its block may have.
             assert!(stats.error_bound >= expected.error_bound, "{kind:?}: {request:?}");
         }
-        assert_eq!(client.fetched(), given.get());
+        assert_eq!(client.session().fetched(), given.get());
         // But for the block of which the first request brought a part.
         let index = client.session().decoder().index();
         let blocks = index.into_iter().flat_map(|index| &index.blocks);
@@ -106,7 +104,7 @@ fn meshes_and_bounds_are_those_of_the_whole_file() {
 fn a_small_request_needs_a_part_of_the_file() {
     let file = file(MtKind::HalfEdge);
     let (source, given) = Counted::new(&file);
-    let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+    let mut client = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
     let stats = client.refine(&Request::within(0.1)).expect("a sound file");
     assert!(stats.satisfied && stats.applied > 0);
     // Not half of it, for a client reads some 64 KiB at first.
@@ -122,7 +120,7 @@ fn a_small_request_needs_a_part_of_the_file() {
 fn steps_give_valid_meshes_on_the_way() {
     let file = file(MtKind::HalfEdge);
     let (source, _) = Counted::new(&file);
-    let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+    let mut client = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
     client.request(&Request::within(0.0)).expect("a sensible request");
     let mut steps = 0;
     loop {
@@ -133,7 +131,7 @@ fn steps_give_valid_meshes_on_the_way() {
         });
         client.session().mesh().expect("it is ready").check().expect("a valid mesh");
         steps += 1;
-        if step.expect("a sound file").complete {
+        if client.is_complete(&step.expect("a sound file")) {
             break;
         }
         assert!(steps < 1000, "it comes to an end");
@@ -152,8 +150,7 @@ fn blocks_stay_within_the_memory() {
     whole.feed(&file).expect("a sound file");
     let memory = whole.mt().map_or(0, MultiTessellation::bytes) * 2 / 3;
     let (source, _) = Counted::new(&file);
-    let mut client =
-        Client::open(source, ClientOptions { memory, ..ClientOptions::default() }).expect("sound");
+    let mut client = Client::open(source, DecodeOptions::default(), memory).expect("sound");
     let mut complete = 0;
     for request in requests() {
         client.refine(&request).expect("a sound file");
@@ -178,7 +175,7 @@ fn files_that_are_cut_or_damaged_are_told() {
         let file = file(kind);
         let all = |bytes: &[u8]| {
             let (source, _) = Counted::new(bytes);
-            let mut client = Client::open(source, ClientOptions::default())?;
+            let mut client = Client::open(source, DecodeOptions::default(), u64::MAX)?;
             client.refine(&Request::within(0.0)).map(drop)
         };
         assert_eq!(all(&file), Ok(()));
@@ -200,18 +197,18 @@ fn files_that_are_cut_or_damaged_are_told() {
 fn a_request_that_makes_no_sense_changes_nothing() {
     let file = file(MtKind::HalfEdge);
     let (source, _) = Counted::new(&file);
-    let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+    let mut client = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
     client.refine(&Request::within(0.01)).expect("a sound file");
     let hash = client.session().hash();
     assert!(matches!(client.refine(&Request::within(-1.0)), Err(ClientError::Session(_))));
     assert_eq!(client.session().hash(), hash);
 }
 
-/// Answers all that `loader` asks for with bytes of `file`, in pieces, until `remote` waits for nothing more.
-fn serve(remote: &mut Remote, loader: &mut Loader, file: &[u8]) -> Result<(), FormatError> {
+/// Answers all that `loader` asks for with bytes of `file`, in pieces, until `session` waits for nothing more.
+fn serve(session: &mut Session, loader: &mut Loader, file: &[u8]) -> Result<(), FormatError> {
     let total = file.len() as u64;
     loop {
-        remote.supply(loader)?;
+        session.supply(loader)?;
         let (id, range) = match loader.next(0) {
             Some(Action::Fetch { id, range, .. }) => (id, range),
             Some(Action::Cancel { .. }) => continue,
@@ -237,34 +234,34 @@ fn serve(remote: &mut Remote, loader: &mut Loader, file: &[u8]) -> Result<(), Fo
 fn without_io_it_is_the_same_machine() {
     let file = file(MtKind::HalfEdge);
     let mut loader = Loader::new(LoaderOptions { gap: 64, ..LoaderOptions::default() });
-    let mut remote = Remote::in_parts(DecodeOptions::default(), u64::MAX);
-    serve(&mut remote, &mut loader, &file).expect("a sound file");
-    assert!(remote.session().mesh().is_some() && !remote.session().is_waiting());
+    let mut session = Session::in_parts(DecodeOptions::default(), u64::MAX);
+    serve(&mut session, &mut loader, &file).expect("a sound file");
+    assert!(session.mesh().is_some() && !session.is_waiting());
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
     for request in requests() {
-        remote.request(&request, &[]).expect("a sensible request");
-        let mut step = remote.step(&mut |_| true).expect("a sound file");
-        while !step.complete {
-            assert!(!step.stats.done || remote.session().is_waiting(), "there is a reason to go on");
-            serve(&mut remote, &mut loader, &file).expect("a sound file");
-            step = remote.step(&mut |_| true).expect("a sound file");
+        session.request(&request).expect("a sensible request");
+        let mut stats = session.step(&mut |_| true).expect("a sound file");
+        while !stats.done || session.is_waiting() {
+            assert!(!stats.done || session.is_waiting(), "there is a reason to go on");
+            serve(&mut session, &mut loader, &file).expect("a sound file");
+            stats = session.step(&mut |_| true).expect("a sound file");
         }
         let expected = whole.refine(&request).expect("a sound file");
-        assert_eq!(remote.session().hash(), whole.hash(), "{request:?}");
-        assert_eq!((step.stats.satisfied, step.stats.missing), (expected.satisfied, false));
+        assert_eq!(session.hash(), whole.hash(), "{request:?}");
+        assert_eq!((stats.satisfied, stats.missing), (expected.satisfied, false));
     }
     assert_eq!(loader.total(), Some(file.len() as u64));
-    assert!(remote.fetched() <= loader.traffic().received);
+    assert!(session.fetched() <= loader.traffic().received);
     // A file that was cut: told, and not asked for again and again.
     for end in [10, file.len() / 3] {
-        let (mut loader, mut remote) =
-            (Loader::default(), Remote::in_parts(DecodeOptions::default(), u64::MAX));
-        let opened = serve(&mut remote, &mut loader, &file[..end]);
+        let (mut loader, mut session) =
+            (Loader::default(), Session::in_parts(DecodeOptions::default(), u64::MAX));
+        let opened = serve(&mut session, &mut loader, &file[..end]);
         let found = opened.and_then(|()| {
-            remote.request(&Request::within(0.0), &[]).expect("a sensible request");
-            remote.step(&mut |_| true).expect("a sound beginning");
-            serve(&mut remote, &mut loader, &file[..end])
+            session.request(&Request::within(0.0)).expect("a sensible request");
+            session.step(&mut |_| true).expect("a sound beginning");
+            serve(&mut session, &mut loader, &file[..end])
         });
         assert!(matches!(found, Err(FormatError::Truncated { .. })), "{end}: {found:?}");
     }

@@ -36,7 +36,7 @@ fn opened(file: &[u8], fields: &[String]) -> (Session, u64) {
 fn fetch(session: &mut Session, file: &[u8]) -> u64 {
     let Some(wanted) = session.wanted().into_iter().next() else { return 0 };
     let [start, end] = [wanted.range.start, wanted.range.end].map(|at| at.min(file.len() as u64));
-    session.take(start, &file[start as usize..end as usize]).expect("a sound file");
+    session.take(&wanted.range, &file[start as usize..end as usize]).expect("a sound file");
     end - start
 }
 

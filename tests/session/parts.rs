@@ -53,7 +53,7 @@ fn settle(session: &mut Session, server: &mut Server<'_>, random: &mut Random, r
         }
         let Some(chosen) = wanted.get(random.below(wanted.len().max(1))) else { break };
         let bytes = server.get(chosen.range.clone());
-        session.take(chosen.range.start, &bytes).expect("a sound file");
+        session.take(&chosen.range, &bytes).expect("a sound file");
         assert!(session.block_progress().bytes <= room + 40_000, "what waits is compressed");
         if random.once_in(3) && session.mesh().is_some() {
             session.step(&mut |_| true).expect("a sound file");
@@ -142,7 +142,7 @@ fn the_map_of_blocks_tells_where_they_are_and_which_are_used() {
     while session.info().is_none() {
         let head = session.wanted()[0].range.clone();
         let bytes = server.get(head.clone());
-        session.take(head.start, &bytes).expect("a sound file");
+        session.take(&head, &bytes).expect("a sound file");
     }
     session.request(&Request::from(Need::within(0.1).inside(corner))).expect("a sensible request");
     assert!(settle(&mut session, &mut server, random, u64::MAX / 2));

@@ -232,11 +232,10 @@ fn replayed(mt: &impl ApplyUpdates, mut each: impl FnMut(UpdateId, [Vec<Seen>; 2
     let mut mesh = mt.start().expect("a valid base mesh");
     mt.updates_arrived(&mut mesh, 0);
     for u in (0..mt.updates()).map(UpdateId) {
-        let (mut removed, mut found) = (Vec::new(), Vec::new());
-        mt.find_removed(&mut mesh, u, &mut removed).expect("a valid MT");
+        let removed = mt.find_removed(&mut mesh, u).expect("a valid MT");
         let removed = seen(&mesh, &removed);
         assert_eq!(mt.refine(&mut mesh, u), Ok(Applied::Done), "{u:?}");
-        mt.find_inserted(&mut mesh, u, &mut found).expect("a valid MT");
+        let found = mt.find_inserted(&mut mesh, u).expect("a valid MT");
         each(u, [removed, seen(&mesh, &found)]);
     }
     mesh

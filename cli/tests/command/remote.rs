@@ -2,9 +2,9 @@
 
 use crate::support::{Folder, Server, good, json};
 use std::fs;
-use tetralod::client::{Client, ClientOptions};
+use tetralod::format::DecodeOptions;
 use tetralod::refine::Request;
-use tetralod::session::Session;
+use tetralod::session::{Client, Session};
 use tetralod::stream::{HttpOptions, HttpSource, LoaderOptions};
 
 /// Writes an MT of many blocks: more than a client reads at first.
@@ -23,7 +23,7 @@ fn clients_read_what_they_need() {
     // Small gaps, for the file is small.
     let loader = LoaderOptions { gap: 64, ..LoaderOptions::default() };
     let source = HttpSource::new(&server.url, HttpOptions { loader, ..HttpOptions::default() });
-    let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+    let mut client = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
     let mut whole = Session::new();
     whole.feed(&bytes).expect("a sound file");
     for request in [Request::within(0.1), Request::within(0.03), Request::within(0.0)] {

@@ -1,7 +1,6 @@
 //! The wasm module `core` of the npm package: the class that its worker holds, with one MT being decoded, and its current mesh.
 
 use tetralod::mt::{MeshChanges, MtInfo};
-use tetralod::session::Session;
 use tetralod_web::file::File;
 use tetralod_web::loader::RangeLoader;
 use tetralod_web::mesh_changes::{self, Changes};
@@ -61,19 +60,19 @@ impl CoreSession {
 
     /// Takes the next bytes of the file, however they were cut.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<JsProgress, WebError> {
-        self.session_mut().feed(bytes)?;
+        self.file.session.feed(bytes)?;
         Ok(self.progress())
     }
 
     /// The file has ended: refuses one that was cut short.
     pub fn finish(&mut self) -> Result<JsProgress, WebError> {
-        self.session_mut().finish()?;
+        self.file.session.finish()?;
         Ok(self.progress())
     }
 
     /// What is known of the MT; `undefined` until the base mesh is there.
     pub fn info(&self) -> Option<JsInfo> {
-        results::info(self.file.session())
+        results::info(&self.file.session)
     }
 
     /// Changes the current mesh to what `options` asks for, as far as the data has arrived.
@@ -97,27 +96,27 @@ impl CoreSession {
     #[wasm_bindgen(js_name = setField)]
     pub fn set_field(&mut self, field: &JsValue) -> Result<(), WebError> {
         let index = field_index(self.known()?, field)?;
-        Ok(self.session_mut().set_field(index)?)
+        Ok(self.file.session.set_field(index)?)
     }
 
     /// The current mesh, and what has changed in it since `mesh` or `delta` was last called. `arrays` is a set of bits: 1 for
     /// positions, 2 for the field, 4 for tetrahedra, 8 for neighbours.
     pub fn mesh(&mut self, arrays: u32) -> Result<JsMesh, WebError> {
         let (stored, changes) = (self.file.stored()?, self.changes()?);
-        Ok(mesh_changes::mesh(&self.session_mut().view(), &stored, &changes, arrays))
+        Ok(mesh_changes::mesh(&self.file.session.view(), &stored, &changes, arrays))
     }
 
     /// Of the current mesh only what has changed since `mesh` or `delta` was last called.
     pub fn delta(&mut self, arrays: u32) -> Result<JsDelta, WebError> {
         let (stored, changes) = (self.file.stored()?, self.changes()?);
-        Ok(mesh_changes::delta(&self.session_mut().view(), &stored, &changes, arrays))
+        Ok(mesh_changes::delta(&self.file.session.view(), &stored, &changes, arrays))
     }
 
     /// Where those four arrays are in wasm memory, as `mesh` last handed them out, until the next call: address and number of elements of
     /// each.
     pub fn places(&mut self) -> Result<Vec<usize>, WebError> {
         let stored = self.file.stored()?;
-        let mesh = self.file.session_mut().view();
+        let mesh = self.file.session.view();
         let (positions, values) = self.single.get_or_insert_with(|| {
             let positions = mesh.positions.iter().map(|point| stored.position(*point));
             (positions.collect(), mesh.field.iter().map(|value| stored.value(*value)).collect())
@@ -131,15 +130,11 @@ impl CoreSession {
         Ok(arrays.concat())
     }
 
-    fn session_mut(&mut self) -> &mut Session {
-        self.file.session_mut()
-    }
-
     /// What has changed since a mesh was last handed out; another one is handed out with it.
     fn changes(&mut self) -> Result<Changes, WebError> {
         self.known()?;
         self.handed += 1;
-        let ranges = self.session_mut().take_changes();
+        let ranges = self.file.session.take_changes();
         if self.single.is_some() {
             self.keep_up(&ranges)?;
         }
@@ -149,7 +144,7 @@ impl CoreSession {
     /// Brings the mesh in single precision up to date.
     fn keep_up(&mut self, changes: &MeshChanges) -> Result<(), WebError> {
         let stored = self.file.stored()?;
-        let mesh = self.file.session_mut().view();
+        let mesh = self.file.session.view();
         let Some((positions, values)) = &mut self.single else { return Ok(()) };
         positions.resize(mesh.positions.len(), [0.0; 3]);
         values.resize(mesh.field.len(), 0.0);

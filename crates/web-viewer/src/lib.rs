@@ -178,7 +178,7 @@ impl Viewer {
 
     /// Takes the next bytes of the file, however they were cut.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<JsProgress, WebError> {
-        self.file.session_mut().feed(bytes)?;
+        self.file.session.feed(bytes)?;
         self.arrive();
         Ok(self.progress())
     }
@@ -192,7 +192,7 @@ impl Viewer {
         };
         let supplied = next.supply();
         // A file that is broken from its beginning does not take the place of one that is sound.
-        let is_known = next.session().info().is_some();
+        let is_known = next.session.info().is_some();
         if matches!(supplied, Ok(false)) || supplied.is_err() && !is_known {
             self.next = Some(next);
             return supplied;
@@ -221,7 +221,7 @@ impl Viewer {
     /// Where the blocks are, and which of them are here; nothing where the file has no index.
     #[wasm_bindgen(js_name = blockMap)]
     pub fn block_map(&self) -> Option<JsBlockMap> {
-        let blocks = self.file.session().block_map();
+        let blocks = self.file.session.block_map();
         let bounds: Vec<f64> = blocks.iter().flat_map(|block| flat(&block.bounds)).collect();
         let states: Vec<u8> = blocks.iter().map(|block: &MappedBlock| block.state as u8).collect();
         let map =
@@ -231,13 +231,13 @@ impl Viewer {
 
     /// The file has ended: refuses one that was cut short.
     pub fn finish(&mut self) -> Result<JsProgress, WebError> {
-        self.file.session_mut().finish()?;
+        self.file.session.finish()?;
         Ok(self.progress())
     }
 
     /// What is known of the MT; `undefined` until the base mesh is there.
     pub fn info(&self) -> Option<JsInfo> {
-        results::info(self.file.session())
+        results::info(&self.file.session)
     }
 
     /// The box around the mesh: `[x0, y0, z0, x1, y1, z1]`; empty until the base mesh is there.
@@ -261,7 +261,7 @@ impl Viewer {
     /// More of the file has come, and with it perhaps what was asked for.
     #[wasm_bindgen(js_name = requestAgain)]
     pub fn request_again(&mut self) {
-        self.moving = self.file.session().info().is_some();
+        self.moving = self.file.session.info().is_some();
     }
 
     /// Whether `step` has something to do.
@@ -277,7 +277,7 @@ impl Viewer {
     /// Keeps a copy of the mesh, to be compared with later ones.
     pub fn keep(&mut self) -> Result<(), WebError> {
         self.is_stale = true;
-        Ok(self.scene.keep(self.file.session_mut())?)
+        Ok(self.scene.keep(&mut self.file.session)?)
     }
 
     /// Keeps the mesh as it is, whatever is asked for and wherever the camera goes; or lets it follow again.
@@ -287,7 +287,7 @@ impl Viewer {
 
     /// Holds the mesh to so many tetrahedra for a time, if the request allows more; `undefined` ends that.
     pub fn limit(&mut self, tets: Option<u32>) -> Result<(), WebError> {
-        self.moving = self.file.session().info().is_some();
+        self.moving = self.file.session.info().is_some();
         self.file.limit(tets)
     }
 
@@ -305,7 +305,7 @@ impl Viewer {
     /// A copy of the mesh that is shown.
     pub fn mesh(&mut self) -> Result<JsMesh, WebError> {
         let stored = self.file.stored()?;
-        Ok(results::mesh_arrays(&self.file.session_mut().view(), &stored, 0b1111))
+        Ok(results::mesh_arrays(&self.file.session.view(), &stored, 0b1111))
     }
 
     /// Sets what is drawn: a [`SceneState`](tetralod_render::scene::SceneState) as a plain object.
@@ -363,14 +363,14 @@ impl Viewer {
     /// What is shown at a screen point; nothing if nothing is there.
     pub fn pick(&mut self, x: f64, y: f64) -> Result<Option<JsReading>, WebError> {
         let ray = self.camera.ray(DVec2::new(x, y), self.aspect());
-        match self.scene.pick(self.file.session_mut(), &ray) {
+        match self.scene.pick(&mut self.file.session, &ray) {
             Some(point) => self.reading_at(point),
             None => Ok(None),
         }
     }
 
     fn reading_at(&mut self, point: [f64; 3]) -> Result<Option<JsReading>, WebError> {
-        let session = self.file.session_mut();
+        let session = &mut self.file.session;
         let Some(reading) = session.reading(point)? else { return Ok(None) };
         let fields = &session.info().ok_or_else(WebError::not_ready)?.fields;
         let now = fields[session.field()].time;
@@ -540,8 +540,8 @@ impl Viewer {
             return Ok(false);
         }
         // What cannot be shown is told once, and all else is drawn.
-        let updated = self.scene.update(self.file.session_mut());
-        let drawn = self.scene.draw(self.file.session_mut(), &self.camera)?;
+        let updated = self.scene.update(&mut self.file.session);
+        let drawn = self.scene.draw(&mut self.file.session, &self.camera)?;
         self.is_stale = !drawn;
         updated?;
         Ok(drawn)
@@ -574,7 +574,7 @@ impl Viewer {
     /// Bytes have come: when the base mesh is there, look at it. Nothing is drawn yet: the worker takes from the scene what does not
     /// fit the volume.
     fn arrive(&mut self) {
-        if self.scene.meet(self.file.session_mut()) {
+        if self.scene.meet(&mut self.file.session) {
             self.is_stale = true;
             self.home();
         }

@@ -24,7 +24,7 @@ impl Viewer {
     #[wasm_bindgen(js_name = drawScreenshot)]
     pub fn draw_screenshot(&mut self, samples: u32) -> Result<(), WebError> {
         let Some(target) = &mut self.screenshot else { return Err(WebError::not_ready()) };
-        let session = self.file.session_mut();
+        let session = &mut self.file.session;
         self.scene.update(session)?;
         self.scene.draw_on(target, session, &self.camera, samples)?;
         self.is_stale = true;

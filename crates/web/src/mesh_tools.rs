@@ -20,10 +20,10 @@ macro_rules! mesh_tools {
                     smooth: bool,
                     fields: &[usize],
                 ) -> Result<tools::JsIsoSurface, WebError> {
-                    let session = self.file.session_mut();
+                    let session = &mut self.file.session;
                     session.set_normal_kind(if smooth { NormalKind::Smooth } else { NormalKind::Gradient });
                     session.isosurfaces(values)?;
-                    let (session, stored) = (self.file.session(), self.file.stored()?);
+                    let (session, stored) = (&self.file.session, self.file.stored()?);
                     let (surface, mesh) = (session.last_surfaces().0, session.last_view());
                     let js = tools::iso_surface(surface, &stored);
                     tools::put_fields(
@@ -41,8 +41,8 @@ macro_rules! mesh_tools {
                     fields: &[usize],
                 ) -> Result<tools::JsSlice, WebError> {
                     let plane = tools::plane(normal, offset)?;
-                    self.file.session_mut().slice(&plane)?;
-                    let (session, stored) = (self.file.session(), self.file.stored()?);
+                    self.file.session.slice(&plane)?;
+                    let (session, stored) = (&self.file.session, self.file.stored()?);
                     let (slice, mesh) = (session.last_surfaces().1, session.last_view());
                     let js = tools::section(slice, &stored);
                     tools::put_fields(
@@ -54,27 +54,27 @@ macro_rules! mesh_tools {
 
                 /// The boundary of the current mesh, with the values of other fields.
                 pub fn surface(&mut self, fields: &[usize]) -> Result<tools::JsSurface, WebError> {
-                    self.file.session_mut().view();
-                    let (session, stored) = (self.file.session(), self.file.stored()?);
+                    self.file.session.view();
+                    let (session, stored) = (&self.file.session, self.file.stored()?);
                     let fields = fields.iter().map(|field| session.values(*field));
                     Ok(tools::boundary(&session.last_view(), fields, &stored))
                 }
 
                 /// A field at the points of the current mesh, by its number.
                 pub fn values(&self, field: usize) -> Vec<f64> {
-                    self.file.session().values(field)
+                    self.file.session.values(field)
                 }
 
                 /// The field at some points, three coordinates each; NaN outside of the mesh.
                 pub fn probe(&mut self, points: &[f64]) -> Result<Vec<f64>, WebError> {
                     self.file.info()?;
-                    tools::probe(self.file.session_mut().view(), points)
+                    tools::probe(self.file.session.view(), points)
                 }
 
                 /// The field along a line.
                 pub fn line(&mut self, from: &[f64], to: &[f64]) -> Result<tools::JsProfile, WebError> {
                     self.file.info()?;
-                    tools::line(self.file.session_mut().view(), from, to)
+                    tools::line(self.file.session.view(), from, to)
                 }
 
                 /// The streamlines from some seeds, three coordinates each, through the vector field of three fields.
@@ -94,7 +94,7 @@ macro_rules! mesh_tools {
                     let fields: [usize; 3] = fields.try_into().map_err(|_| {
                         WebError::bad_option("fields", "a vector field is the names of three fields")
                     })?;
-                    let session = self.file.session_mut();
+                    let session = &mut self.file.session;
                     let vectors = fields.map(|field| session.values(field));
                     let vectors = vectors.each_ref().map(|v| &v[..]);
                     tools::streamlines(
@@ -114,11 +114,11 @@ macro_rules! mesh_tools {
                     high: f64,
                     fractions: &[f64],
                 ) -> Result<tools::JsStats, WebError> {
-                    let field = self.file.session_mut().field();
+                    let field = self.file.session.field();
                     let info = &self.file.info()?.fields[field];
                     let low = if low.is_nan() { info.min } else { low };
                     let high = if high.is_nan() { info.min + info.range() } else { high };
-                    tools::stats(&self.file.session_mut().view(), bins, [low, high], fractions)
+                    tools::stats(&self.file.session.view(), bins, [low, high], fractions)
                 }
 
                 /// A hash of the current mesh, the same wherever the same request was made.

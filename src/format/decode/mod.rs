@@ -59,8 +59,9 @@ impl ExactStatus {
 }
 
 /// What the next bytes belong to.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 enum Stage {
+    #[default]
     Header,
     Head,
     /// A section's content: `start` is its place in the file, `left` the bytes that are missing.
@@ -92,7 +93,7 @@ pub struct DecodeOptions {
 /// After an error the MT stays usable as far as it came, and all further bytes give the same error.
 ///
 /// The blocks of a half-edge MT may also come in another order, each as a whole: see [`Decoder::take_block`].
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Decoder {
     options: DecodeOptions,
     stage: Stage,
@@ -118,33 +119,10 @@ pub struct Decoder {
     failed: Option<FormatError>,
 }
 
-impl Default for Decoder {
-    fn default() -> Self {
-        Self::new(DecodeOptions::default())
-    }
-}
-
 impl Decoder {
     /// A decoder at the start of a file.
     pub fn new(options: DecodeOptions) -> Self {
-        Self {
-            options,
-            stage: Stage::Header,
-            buffer: Vec::new(),
-            bytes: 0,
-            total: None,
-            sections: 0,
-            chain: checksum::Hasher::new(),
-            metadata: Metadata::new(),
-            head: FileHead::default(),
-            mt: None,
-            in_order: None,
-            next_block: 0,
-            block: None,
-            exact: Vec::new(),
-            has_all_exact: false,
-            failed: None,
-        }
+        Self { options, ..Self::default() }
     }
 
     /// Takes in the next bytes of the file.

@@ -10,10 +10,10 @@ use crate::format::payload::exact::Corrections;
 use crate::format::payload::half_edge;
 use crate::format::payload::histogram::Histograms;
 use crate::format::payload::kind_codec::codec_of;
-use crate::format::payload::{FieldPart, bounds, index};
+use crate::format::payload::{FieldPart, bounds};
 use crate::format::read::Reader;
 use crate::format::{BlockInfo, FormatError, Index, payload};
-use crate::mt::{Mt, MtInfo, MultiTessellation, UpdatePages};
+use crate::mt::{Mt, MtInfo, MultiTessellation, UpdatePages, updates_of_page};
 use std::ops::Range;
 
 impl Decoder {
@@ -183,7 +183,7 @@ impl Decoder {
         if !in_place && expected.is_none() || block != expected.unwrap_or(self.next_block) {
             return Err(content.corrupt("a block of updates is missing or repeated"));
         }
-        let updates = index::updates_of(self.head.block_bits, block, info.updates);
+        let updates = updates_of_page(self.head.block_bits, block, info.updates);
         if updates.is_empty() {
             return Err(content.corrupt("there are more updates than the description says"));
         }

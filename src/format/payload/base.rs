@@ -4,8 +4,8 @@
 //! with them: see `mesh::growth_order`, by which builders number them. A mesh that is in another
 //! order comes back as it was, too, but takes far more bits.
 
-use crate::format::FormatError;
 use crate::format::coder::{Family, Put, Source};
+use crate::format::error::Result;
 use crate::geom::WIDE_BITS;
 use crate::mesh::{Gate, Growth};
 use crate::mt::BaseMesh;
@@ -170,7 +170,7 @@ fn predict(growth: &Growth, gate: &Gate) -> ([(i32, u32); 3], u32) {
 
 /// Reads a base mesh of so many vertices and tetrahedra, without field levels. Only what is there takes memory, but
 /// symbols may take no bits: what the counts make of it has to be within limits.
-pub fn read(source: &mut Source<'_>, vertices: u32, tets: u32) -> Result<BaseMesh, FormatError> {
+pub fn read(source: &mut Source<'_>, vertices: u32, tets: u32) -> Result<BaseMesh> {
     let mut growth = Growth::default();
     if source.bits(1)? == 0 {
         read_rest(source, &mut growth, vertices)?;
@@ -185,12 +185,7 @@ pub fn read(source: &mut Source<'_>, vertices: u32, tets: u32) -> Result<BaseMes
     Ok(BaseMesh { positions: growth.positions, values: Vec::new(), tets: growth.tets })
 }
 
-fn read_behind(
-    source: &mut Source<'_>,
-    growth: &mut Growth,
-    gate: &Gate,
-    vertices: u32,
-) -> Result<(), FormatError> {
+fn read_behind(source: &mut Source<'_>, growth: &mut Growth, gate: &Gate, vertices: u32) -> Result<()> {
     let apex = match source.symbol(BEHIND, context(gate))? {
         NOTHING => {
             growth.close();
@@ -216,7 +211,7 @@ fn read_behind(
     Ok(())
 }
 
-fn read_seed(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Result<(), FormatError> {
+fn read_seed(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Result<()> {
     let mut tet = [0; 4];
     for v in &mut tet {
         *v = match source.symbol(SEED, 0)? {
@@ -228,7 +223,7 @@ fn read_seed(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Res
     Ok(())
 }
 
-fn read_vertex(source: &mut Source<'_>, growth: &Growth) -> Result<u32, FormatError> {
+fn read_vertex(source: &mut Source<'_>, growth: &Growth) -> Result<u32> {
     let v = source.bits(width(growth))?;
     if v as usize >= growth.positions.len() {
         return Err(source.corrupt("the base mesh uses a vertex that is not there"));
@@ -236,14 +231,14 @@ fn read_vertex(source: &mut Source<'_>, growth: &Growth) -> Result<u32, FormatEr
     Ok(v)
 }
 
-fn read_rest(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Result<(), FormatError> {
+fn read_rest(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Result<()> {
     while growth.positions.len() < vertices as usize {
         read_step(source, growth, vertices)?;
     }
     Ok(())
 }
 
-fn read_step(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Result<u32, FormatError> {
+fn read_step(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Result<u32> {
     let mut position = growth.positions.last().copied().unwrap_or_default();
     for x in &mut position {
         *x = x.wrapping_add(source.signed(STEP, 0)?);
@@ -251,7 +246,7 @@ fn read_step(source: &mut Source<'_>, growth: &mut Growth, vertices: u32) -> Res
     add_vertex(source, growth, vertices, position)
 }
 
-fn read_position(source: &mut Source<'_>, growth: &Growth, gate: &Gate) -> Result<[i32; 3], FormatError> {
+fn read_position(source: &mut Source<'_>, growth: &Growth, gate: &Gate) -> Result<[i32; 3]> {
     let (expected, size) = predict(growth, gate);
     let mut position = [0; 3];
     for (x, (expected, which)) in position.iter_mut().zip(expected) {
@@ -271,12 +266,7 @@ fn read_position(source: &mut Source<'_>, growth: &Growth, gate: &Gate) -> Resul
     Ok(position)
 }
 
-fn add_vertex(
-    source: &Source<'_>,
-    growth: &mut Growth,
-    vertices: u32,
-    position: [i32; 3],
-) -> Result<u32, FormatError> {
+fn add_vertex(source: &Source<'_>, growth: &mut Growth, vertices: u32, position: [i32; 3]) -> Result<u32> {
     if !position.iter().all(|x| (0..=1 << WIDE_BITS).contains(x)) {
         return Err(source.corrupt("a vertex of the base mesh is off the lattice"));
     }
@@ -289,6 +279,7 @@ fn add_vertex(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::FormatError;
     use crate::format::coder::{Counts, Models, Writer};
     use crate::format::read::Reader;
     use crate::mesh::{NONE, growth_order, kuhn_tets};

@@ -1,10 +1,11 @@
 //! What the rest of the format knows of a kind of MT: each kind implements [`Codec`] in its own file.
 
 use super::changes::{bound_of, upper_byte};
-use crate::format::coder::{Counts, Family, Models, Put, Source, Writer};
+use crate::format::coder::{Counts, Family, Models, Put, Source};
+use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::section::Section;
-use crate::format::{EncodeError, FormatError, Limits};
+use crate::format::{EncodeError, Limits};
 use crate::mt::{
     ApplyUpdates, BaseMesh, BaseMeshError, ErrorCode, Mt, MtFacts, MtInfo, MtKind, UpdateError, UpdateId,
 };
@@ -42,10 +43,31 @@ pub trait Codec: ApplyUpdates + Sized {
         counts: [u32; 2],
         block_bits: u32,
         limits: &Limits,
-    ) -> Result<Box<dyn Head>, FormatError>;
+    ) -> Result<Box<dyn Head>>;
 
-    /// Puts all updates, block by block.
-    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError>;
+    /// What a writer keeps from one block to the next.
+    type Writing;
+
+    /// What it keeps at the start.
+    fn writing(&self) -> Result<Self::Writing, BaseMeshError>;
+
+    /// Puts the updates of a block, which follow those that were put before.
+    fn put_block(
+        &self,
+        out: &mut impl Put,
+        updates: Range<u32>,
+        writing: &mut Self::Writing,
+    ) -> Result<(), UpdateError>;
+
+    /// Puts all updates, block by block. Where blocks come in order, each says how large the errors behind it are.
+    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
+        let mut writing = self.writing().map_err(EncodeError::Base)?;
+        for (block, bounds) in (0..).zip(bounds_behind(self)) {
+            bounds.into_iter().for_each(|bound| out.bits(u32::from(bound), 8));
+            self.put_block(out, self.page_updates(block), &mut writing).map_err(EncodeError::Update)?;
+        }
+        Ok(())
+    }
 
     /// How often each symbol occurs in what [`Codec::put_updates`] puts.
     fn count_updates(&self) -> Result<Counts, EncodeError> {
@@ -59,8 +81,21 @@ pub trait Codec: ApplyUpdates + Sized {
         None
     }
 
-    /// The sections of each block.
-    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError>;
+    /// The sections of each block; one where blocks come in order.
+    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
+        let mut writing = self.writing().map_err(EncodeError::Base)?;
+        let mut sections = Vec::new();
+        for (block, bounds) in (0..).zip(bounds_behind(self)) {
+            let mut done = Ok(());
+            let section = Section::coded(Self::SECTION, &[block], models, |out| {
+                bounds.into_iter().for_each(|bound| out.bits(u32::from(bound), 8));
+                done = self.put_block(out, self.page_updates(block), &mut writing);
+            });
+            done.map_err(EncodeError::Update)?;
+            sections.push(vec![section?]);
+        }
+        Ok(sections)
+    }
 }
 
 /// What stands in `BASE` behind the base mesh, until the levels of that are here, too.
@@ -72,7 +107,7 @@ pub trait Head: Debug + Send + Sync {
         base: BaseMesh,
         block_bits: u32,
         tet_errors: bool,
-    ) -> Result<Started, FormatError>;
+    ) -> Result<Started>;
 }
 
 /// An MT without updates, and what reads these if they come in order.
@@ -81,13 +116,7 @@ pub type Started = (Mt, Option<Box<dyn InOrder>>);
 /// What reads updates that come in order, block by block.
 pub trait InOrder: Debug + Send + Sync {
     /// Reads the next `count` updates into the MT.
-    fn read(
-        &mut self,
-        source: &mut Source<'_>,
-        mt: &mut Mt,
-        count: u32,
-        limits: &Limits,
-    ) -> Result<(), FormatError>;
+    fn read(&mut self, source: &mut Source<'_>, mt: &mut Mt, count: u32, limits: &Limits) -> Result<()>;
 }
 
 /// For each block and field what bounds the errors of the updates behind the block: see [`upper_byte`].
@@ -105,38 +134,6 @@ fn bounds_behind(mt: &impl Codec) -> Vec<Vec<u8>> {
 }
 
 /// Reads what bounds the errors of the updates behind a block that is one of those in order.
-pub fn read_bounds(source: &mut Source<'_>, fields: usize) -> Result<Vec<ErrorCode>, FormatError> {
+pub fn read_bounds(source: &mut Source<'_>, fields: usize) -> Result<Vec<ErrorCode>> {
     (0..fields).map(|_| Ok(bound_of(source.bits(8)? as u8))).collect()
-}
-
-/// [`Codec::put_updates`] where blocks come in order. `put` gets the updates of each.
-pub fn put_in_order<P: Put>(
-    out: &mut P,
-    mt: &impl Codec,
-    mut put: impl FnMut(&mut P, Range<u32>) -> Result<(), UpdateError>,
-) -> Result<(), EncodeError> {
-    for (block, bounds) in (0..).zip(bounds_behind(mt)) {
-        bounds.into_iter().for_each(|bound| out.bits(u32::from(bound), 8));
-        put(out, mt.page_updates(block)).map_err(EncodeError::Update)?;
-    }
-    Ok(())
-}
-
-/// [`Codec::sections`] where blocks come in order, and have one section each. `put` gets the updates of each.
-pub fn sections_in_order<C: Codec>(
-    mt: &C,
-    models: &Models,
-    mut put: impl FnMut(&mut Writer<'_>, Range<u32>) -> Result<(), UpdateError>,
-) -> Result<Vec<Vec<Section>>, EncodeError> {
-    let mut sections = Vec::new();
-    for (block, bounds) in (0..).zip(bounds_behind(mt)) {
-        let mut done = Ok(());
-        let section = Section::coded(C::SECTION, &[block], models, |out| {
-            bounds.into_iter().for_each(|bound| out.bits(u32::from(bound), 8));
-            done = put(out, mt.page_updates(block));
-        });
-        done.map_err(EncodeError::Update)?;
-        sections.push(vec![section?]);
-    }
-    Ok(sections)
 }

@@ -6,15 +6,15 @@
 
 use super::base;
 use super::changes::{FieldPart, put_changes, range_of, read_changes};
-use super::codec::{Codec, Head, InOrder, Parts, Started, put_in_order, sections_in_order};
-use crate::format::coder::{Family, Models, Put, Source};
+use super::codec::{Codec, Head, InOrder, Parts, Started};
+use crate::format::Limits;
+use crate::format::coder::{Family, Put, Source};
+use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
-use crate::format::section::Section;
-use crate::format::{EncodeError, FormatError, Limits};
 use crate::mt::{
     BaseMesh, BaseMeshError, EdgeMt, EdgeUpdate, ErrorCode, MAX_EDGE, Mt, MtInfo, MtKind, MultiTessellation,
-    UpdateId, VertexId,
+    UpdateError, UpdateId, VertexId,
 };
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -89,28 +89,24 @@ impl Codec for EdgeMt {
 
     fn put_head(&self, _: &mut impl Put) {}
 
-    fn read_head(
-        _: &mut Source<'_>,
-        _: &MtInfo,
-        _: [u32; 2],
-        _: u32,
-        _: &Limits,
-    ) -> Result<Box<dyn Head>, FormatError> {
+    fn read_head(_: &mut Source<'_>, _: &MtInfo, _: [u32; 2], _: u32, _: &Limits) -> Result<Box<dyn Head>> {
         Ok(Box::new(Splitting))
     }
 
-    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
-        put_in_order(out, self, |out, updates| {
-            put(out, self, updates);
-            Ok(())
-        })
+    type Writing = ();
+
+    fn writing(&self) -> Result<(), BaseMeshError> {
+        Ok(())
     }
 
-    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
-        sections_in_order(self, models, |out, updates| {
-            put(out, self, updates);
-            Ok(())
-        })
+    fn put_block(&self, out: &mut impl Put, updates: Range<u32>, _: &mut ()) -> Result<(), UpdateError> {
+        put_splits(out, self, updates.clone());
+        for field in 0..self.info().fields.len() {
+            put_changes(out, [ERROR, LEVEL], updates.clone().map(UpdateId), |u| {
+                (self.error_of_field(u, field), self.level_residuals(u).nth(field).unwrap_or(0))
+            });
+        }
+        Ok(())
     }
 }
 
@@ -119,13 +115,7 @@ impl Codec for EdgeMt {
 struct Splitting;
 
 impl Head for Splitting {
-    fn start(
-        self: Box<Self>,
-        info: MtInfo,
-        base: BaseMesh,
-        block_bits: u32,
-        _: bool,
-    ) -> Result<Started, FormatError> {
+    fn start(self: Box<Self>, info: MtInfo, base: BaseMesh, block_bits: u32, _: bool) -> Result<Started> {
         let mut mt = EdgeMt::new(info, base);
         mt.set_page_bits(block_bits);
         Ok((mt.into(), Some(self)))
@@ -133,13 +123,7 @@ impl Head for Splitting {
 }
 
 impl InOrder for Splitting {
-    fn read(
-        &mut self,
-        source: &mut Source<'_>,
-        mt: &mut Mt,
-        count: u32,
-        limits: &Limits,
-    ) -> Result<(), FormatError> {
+    fn read(&mut self, source: &mut Source<'_>, mt: &mut Mt, count: u32, limits: &Limits) -> Result<()> {
         match mt {
             Mt::Edge(mt) => read(source, mt, count, limits),
             _ => Err(source.corrupt("a section is out of place")),
@@ -173,16 +157,6 @@ fn runs(mt: &EdgeMt, first: u32, vertices: &[u32]) -> Vec<u32> {
         runs.push(run);
     }
     runs
-}
-
-/// Puts a block of an MT.
-fn put(out: &mut impl Put, mt: &EdgeMt, updates: Range<u32>) {
-    put_splits(out, mt, updates.clone());
-    for field in 0..mt.info().fields.len() {
-        put_changes(out, [ERROR, LEVEL], updates.clone().map(UpdateId), |u| {
-            (mt.error_of_field(u, field), mt.level_residuals(u).nth(field).unwrap_or(0))
-        });
-    }
 }
 
 /// Puts updates without what they do to fields.
@@ -273,7 +247,7 @@ fn put_mask(out: &mut impl Put, mask: u64) {
 }
 
 /// Reads the next `count` updates into the MT.
-fn read(source: &mut Source<'_>, mt: &mut EdgeMt, count: u32, limits: &Limits) -> Result<(), FormatError> {
+fn read(source: &mut Source<'_>, mt: &mut EdgeMt, count: u32, limits: &Limits) -> Result<()> {
     let fields = mt.info().fields.len();
     check_bytes(mt.bytes() + u64::from(count) * EdgeMt::least_update_bytes(mt.info()), limits)?;
     let splits = read_splits(source, mt, count)?;
@@ -296,7 +270,7 @@ fn read(source: &mut Source<'_>, mt: &mut EdgeMt, count: u32, limits: &Limits) -
 }
 
 /// Reads updates without what they do to fields.
-fn read_splits(source: &mut Source<'_>, mt: &EdgeMt, count: u32) -> Result<Splits, FormatError> {
+fn read_splits(source: &mut Source<'_>, mt: &EdgeMt, count: u32) -> Result<Splits> {
     let first = mt.updates();
     let mut splits = Splits { vertices: read_vertices(source, mt, first, count)?, ..Splits::default() };
     let leads = source.bits(1)? == 1;
@@ -314,12 +288,7 @@ fn read_splits(source: &mut Source<'_>, mt: &EdgeMt, count: u32) -> Result<Split
     Ok(splits)
 }
 
-fn read_vertices(
-    source: &mut Source<'_>,
-    mt: &EdgeMt,
-    first: u32,
-    count: u32,
-) -> Result<Vec<u32>, FormatError> {
+fn read_vertices(source: &mut Source<'_>, mt: &EdgeMt, first: u32, count: u32) -> Result<Vec<u32>> {
     let old = vertices_before(mt, first);
     let roots = source.bits(32)?;
     if roots > count {
@@ -358,7 +327,7 @@ fn read_vertices(
     Ok(vertices)
 }
 
-fn read_offset(source: &mut Source<'_>, above: Option<Offset>, leads: bool) -> Result<Offset, FormatError> {
+fn read_offset(source: &mut Source<'_>, above: Option<Offset>, leads: bool) -> Result<Offset> {
     let edge = u8::try_from(source.number(EDGE, edge_context(above))?).ok().filter(|&edge| edge <= MAX_EDGE);
     let edge =
         edge.ok_or_else(|| source.corrupt("an offset is counted from an edge that cannot be named"))?;
@@ -373,7 +342,7 @@ fn read_offset(source: &mut Source<'_>, above: Option<Offset>, leads: bool) -> R
     Ok((offset, edge))
 }
 
-fn read_mask(source: &mut Source<'_>) -> Result<u64, FormatError> {
+fn read_mask(source: &mut Source<'_>) -> Result<u64> {
     let last = source.symbol(LAST_WRONG, 0)?;
     let mut mask = if last == 0 { 0 } else { 1 << (last - 1) };
     for place in 0..last.saturating_sub(1) {

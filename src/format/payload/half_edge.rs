@@ -8,14 +8,15 @@ use super::base;
 use super::changes::{FieldPart, put_changes, range_of, read_changes};
 use super::codec::{Codec, Head, Parts, Started};
 use crate::format::coder::{Counts, Family, Models, Put, Source, Writer};
+use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
 use crate::format::section::Section;
-use crate::format::{EncodeError, FormatError, Limits};
+use crate::format::{EncodeError, Limits};
 use crate::mesh::NONE;
 use crate::mt::{
     BaseMark, BaseMesh, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, HalfEdgeUpdate, MtFacts, MtInfo,
-    MtKind, MultiTessellation, UpdateId, UpdatePages,
+    MtKind, MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use crate::threads;
 use std::ops::Range;
@@ -107,35 +108,73 @@ impl Codec for HalfEdgeMt {
         own_bytes(info.fields.len() as u64) + size_of::<ForestChild>() as u64
     }
 
+    /// Puts what removes the base tetrahedra, and the forest children of the base vertices.
     fn put_head(&self, out: &mut impl Put) {
-        put_head(out, self);
+        for mark in self.base_marks() {
+            out.number(REMOVER, 0, mark.remover.wrapping_add(1));
+            if mark.remover != NONE {
+                out.symbol(BASE_INNER, 0, u32::from(mark.inner));
+            }
+        }
+        let mut named = Named::behind(0);
+        for v in (0..self.base().positions.len() as u32).map(VertexId) {
+            put_children(out, &mut named, self.children_of(v), self.page_bits());
+        }
     }
 
     fn read_head(
         source: &mut Source<'_>,
         info: &MtInfo,
-        counts: [u32; 2],
+        [vertices, tets]: [u32; 2],
         block_bits: u32,
         limits: &Limits,
-    ) -> Result<Box<dyn Head>, FormatError> {
-        Ok(Box::new(read_head(source, info, counts, block_bits, limits)?))
+    ) -> Result<Box<dyn Head>> {
+        let mut head = BaseHead::default();
+        for _ in 0..tets {
+            let remover = source.number(REMOVER, 0)?.wrapping_sub(1);
+            let inner = if remover == NONE { 0 } else { source.symbol(BASE_INNER, 0)? as u8 };
+            head.marks.push(BaseMark { remover, inner });
+        }
+        let (mut named, mut left) = (Named::behind(0), most_children(info, limits));
+        for _ in 0..vertices {
+            let children = read_children(source, &mut named, block_bits, left)?;
+            left -= children.len() as u32;
+            head.children.push(children);
+        }
+        Ok(Box::new(head))
     }
 
-    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
-        (0..blocks(self) as u32).for_each(|block| put_block(out, self, block));
+    type Writing = ();
+
+    fn writing(&self) -> Result<(), BaseMeshError> {
         Ok(())
+    }
+
+    fn put_block(&self, out: &mut impl Put, updates: Range<u32>, _: &mut ()) -> Result<(), UpdateError> {
+        put(out, self, updates.clone());
+        (0..self.info().fields.len()).for_each(|field| put_field(out, self, updates.clone(), field));
+        Ok(())
+    }
+
+    /// The index says how large errors are.
+    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
+        (0..blocks(self) as u32)
+            .try_for_each(|block| self.put_block(out, self.page_updates(block), &mut ()))
+            .map_err(EncodeError::Update)
     }
 
     /// Blocks do not depend on each other.
     fn count_updates(&self) -> Result<Counts, EncodeError> {
         let of_ranges = threads::map(blocks(self), COUNTED, |blocks| {
             let mut counts = Counts::default();
-            blocks.for_each(|block| put_block(&mut counts, self, block as u32));
-            counts
+            let mut pages = blocks.map(|block| self.page_updates(block as u32));
+            let put = pages.try_for_each(|updates| self.put_block(&mut counts, updates, &mut ()));
+            put.map(|()| counts).map_err(EncodeError::Update)
         });
-        let mut all = Counts::default();
-        of_ranges.iter().for_each(|counts| all.add(counts));
-        Ok(all)
+        of_ranges.into_iter().try_fold(Counts::default(), |mut all, counts| {
+            all.add(&counts?);
+            Ok(all)
+        })
     }
 
     fn known_facts(&self) -> Option<&MtFacts> {
@@ -151,11 +190,6 @@ impl Codec for HalfEdgeMt {
 /// How many blocks an MT has.
 fn blocks(mt: &HalfEdgeMt) -> usize {
     mt.updates().div_ceil(1 << mt.page_bits()) as usize
-}
-
-fn put_block(out: &mut impl Put, mt: &HalfEdgeMt, block: u32) {
-    put(out, mt, mt.page_updates(block));
-    (0..mt.info().fields.len()).for_each(|field| put_field(out, mt, mt.page_updates(block), field));
 }
 
 /// The sections of a block: one that all fields share, and one for each field.
@@ -235,7 +269,7 @@ fn put_offset(out: &mut impl Put, named: &mut Named, offset: [i32; 3]) {
     named.length = longest;
 }
 
-fn read_offset(source: &mut Source<'_>, named: &mut Named) -> Result<[i32; 3], FormatError> {
+fn read_offset(source: &mut Source<'_>, named: &mut Named) -> Result<[i32; 3]> {
     let mut context = named.length;
     let (mut offset, mut longest) = ([0; 3], 0);
     for (axis, d) in (0..).zip(&mut offset) {
@@ -252,7 +286,7 @@ fn read_children(
     named: &mut Named,
     block_bits: u32,
     most: u32,
-) -> Result<Vec<ForestChild>, FormatError> {
+) -> Result<Vec<ForestChild>> {
     let count = source.number(CHILDREN, 0)?;
     if count > most {
         return Err(source.corrupt("a vertex has more children than there are updates"));
@@ -281,20 +315,6 @@ fn read_children(
     Ok(children)
 }
 
-/// Puts what removes the base tetrahedra, and the forest children of the base vertices.
-fn put_head(out: &mut impl Put, mt: &HalfEdgeMt) {
-    for mark in mt.base_marks() {
-        out.number(REMOVER, 0, mark.remover.wrapping_add(1));
-        if mark.remover != NONE {
-            out.symbol(BASE_INNER, 0, u32::from(mark.inner));
-        }
-    }
-    let mut named = Named::behind(0);
-    for v in 0..mt.base().positions.len() as u32 {
-        put_children(out, &mut named, mt.children_of(crate::mt::VertexId(v)), mt.page_bits());
-    }
-}
-
 /// Forest children that can be held. Symbols may take no bits, so what arrives does not bound their number.
 fn most_children(info: &MtInfo, limits: &Limits) -> u32 {
     let held = limits.memory_bytes / size_of::<ForestChild>() as u64;
@@ -309,38 +329,9 @@ struct BaseHead {
 }
 
 impl Head for BaseHead {
-    fn start(
-        self: Box<Self>,
-        info: MtInfo,
-        base: BaseMesh,
-        block_bits: u32,
-        _: bool,
-    ) -> Result<Started, FormatError> {
+    fn start(self: Box<Self>, info: MtInfo, base: BaseMesh, block_bits: u32, _: bool) -> Result<Started> {
         Ok((HalfEdgeMt::new(info, base, self.marks, &self.children, block_bits)?.into(), None))
     }
-}
-
-/// Reads what [`put_head`] puts.
-fn read_head(
-    source: &mut Source<'_>,
-    info: &MtInfo,
-    [vertices, tets]: [u32; 2],
-    block_bits: u32,
-    limits: &Limits,
-) -> Result<BaseHead, FormatError> {
-    let mut head = BaseHead::default();
-    for _ in 0..tets {
-        let remover = source.number(REMOVER, 0)?.wrapping_sub(1);
-        let inner = if remover == NONE { 0 } else { source.symbol(BASE_INNER, 0)? as u8 };
-        head.marks.push(BaseMark { remover, inner });
-    }
-    let (mut named, mut left) = (Named::behind(0), most_children(info, limits));
-    for _ in 0..vertices {
-        let children = read_children(source, &mut named, block_bits, left)?;
-        left -= children.len() as u32;
-        head.children.push(children);
-    }
-    Ok(head)
 }
 
 fn put_star(out: &mut impl Put, star: &[u8]) {
@@ -364,7 +355,7 @@ fn put_star(out: &mut impl Put, star: &[u8]) {
 /// Most bits that the star of an update can have: three faces of each tetrahedron.
 const MOST_BITS: u32 = 3 * 128;
 
-fn read_star(source: &mut Source<'_>, star: &mut Vec<u8>) -> Result<(), FormatError> {
+fn read_star(source: &mut Source<'_>, star: &mut Vec<u8>) -> Result<()> {
     let count = source.symbol(SYMBOLS, 0)?;
     star.push(count as u8);
     for place in 0..count {
@@ -407,13 +398,7 @@ pub struct Insertions {
 
 impl Insertions {
     /// Adds them to an MT as a page, with what they do to each of its fields.
-    pub fn insert(
-        self,
-        mt: &mut HalfEdgeMt,
-        page: u32,
-        fields: &[FieldPart],
-        limits: &Limits,
-    ) -> Result<(), FormatError> {
+    pub fn insert(self, mt: &mut HalfEdgeMt, page: u32, fields: &[FieldPart], limits: &Limits) -> Result<()> {
         check_bytes(mt.bytes() + self.bytes(fields.len() as u64), limits)?;
         let stride = fields.len().max(1);
         let rows = 0..self.stars.len();
@@ -448,7 +433,7 @@ pub fn read(
     block_bits: u32,
     updates: Range<u32>,
     limits: &Limits,
-) -> Result<Insertions, FormatError> {
+) -> Result<Insertions> {
     let mut insertions = Insertions::default();
     let (mut named, mut left) = (Named::behind(updates.start >> block_bits), most_children(info, limits));
     for _ in updates {
@@ -472,6 +457,6 @@ fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, updates: Range<u32>, field: us
 }
 
 /// Reads what the `count` updates of a block do to a field.
-pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart, FormatError> {
+pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart> {
     read_changes(source, [ERROR, LEVEL], count)
 }

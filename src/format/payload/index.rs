@@ -3,7 +3,7 @@
 use super::changes::{bound_of, upper_byte};
 use crate::format::read::Reader;
 use crate::format::{FormatError, write};
-use crate::mt::{ErrorCode, MtInfo};
+use crate::mt::{ErrorCode, MtInfo, updates_of_page};
 use std::ops::Range;
 
 /// What the index of a file says of one block of updates.
@@ -49,7 +49,7 @@ pub struct Index {
 impl Index {
     /// The updates of a block of an MT of so many.
     pub fn updates(&self, block: u32, updates: u32) -> Range<u32> {
-        updates_of(self.block_bits, block, updates)
+        updates_of_page(self.block_bits, block, updates)
     }
 
     /// Widens the numbers of the blocks to those that the file can hold.
@@ -116,12 +116,6 @@ impl Index {
 
 /// Behind what is said of a block.
 const RESERVED: u64 = 0;
-
-/// The updates of a block of `2^block_bits` of an MT of so many.
-pub fn updates_of(block_bits: u32, block: u32, updates: u32) -> Range<u32> {
-    let (first, end) = (u64::from(block) << block_bits, u64::from(updates));
-    first.min(end) as u32..(first + (1 << block_bits)).min(end) as u32
-}
 
 /// What block sizes may be.
 pub const MIN_BLOCK_BITS: u32 = 4;

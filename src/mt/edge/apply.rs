@@ -13,8 +13,9 @@
 //! The word that the mesh keeps with a vertex ([`KindWord`]) is the update that splits it, none if nothing does (yet).
 
 use super::predict::Link;
-use super::star::{FAN_CAPACITY, HalfStar, RING_CAPACITY, Ring, take_ring};
+use super::star::{FAN_CAPACITY, HalfStar, RING_CAPACITY, Ring};
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{GATHERED, Gather};
 use crate::mt::mesh::tet::{TURN, corner_of};
@@ -36,11 +37,7 @@ impl EdgeMt {
     /// # Errors
     /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not updated by
     /// [`UpdatePages::updates_arrived`]; the mesh is unchanged then.
-    pub(in crate::mt) fn apply_split(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-    ) -> Result<Applied, UpdateError> {
+    fn split(&self, mesh: &mut CurrentMesh, u: UpdateId, ring: &mut Ring) -> Result<Applied> {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
@@ -54,13 +51,11 @@ impl EdgeMt {
             // The labels of such a mesh do not show what is feasible.
             return Err(UpdateError::UnknownToMesh { update: u.0 });
         }
-        let mut ring = take_ring(mesh);
         let mut field_offsets = std::mem::take(&mut ring.field_offsets);
         field_offsets.clear();
         field_offsets.extend(self.level_residuals(u));
-        let applied = self.split_ring(mesh, u, &update, p, &mut ring, &mut field_offsets);
+        let applied = self.split_ring(mesh, u, &update, p, ring, &mut field_offsets);
         ring.field_offsets = field_offsets;
-        mesh.put_back_kind_state(ring);
         applied
     }
 
@@ -72,7 +67,7 @@ impl EdgeMt {
         p: u32,
         ring: &mut Ring,
         field_offsets: &mut [i32],
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let update = u.0;
         match mesh.gather_ring(p, update, ring) {
             Ok(()) => {}
@@ -109,13 +104,7 @@ impl EdgeMt {
     }
 
     /// Positions of `v'` and `v''`, checked against the lattices like the levels.
-    fn halve(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        split: &Offsets<'_>,
-        p: u32,
-    ) -> Result<[[i32; 3]; 2], UpdateError> {
+    fn halve(&self, mesh: &CurrentMesh, u: UpdateId, split: &Offsets<'_>, p: u32) -> Result<[[i32; 3]; 2]> {
         let off = UpdateError::OffLattice { update: u.0 };
         let largest = 1_i64 << self.info().lattice.bits;
         let mut positions = [[0; 3]; 2];
@@ -208,24 +197,8 @@ impl EdgeMt {
     /// Undoes update `u` (`u−`, an edge collapse) in `mesh`, which must contain it.
     ///
     /// # Errors
-    /// Never for an update that was applied to this mesh by [`Self::apply_split`].
-    pub(in crate::mt) fn apply_collapse(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-    ) -> Result<Applied, UpdateError> {
-        let mut ring = take_ring(mesh);
-        let applied = self.collapse_ring(mesh, u, &mut ring);
-        mesh.put_back_kind_state(ring);
-        applied
-    }
-
-    fn collapse_ring(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        ring: &mut Ring,
-    ) -> Result<Applied, UpdateError> {
+    /// Never for an update that was applied to this mesh by [`Self::split`].
+    fn collapse(&self, mesh: &mut CurrentMesh, u: UpdateId, ring: &mut Ring) -> Result<Applied> {
         let [p, q] = match self.collapsible(mesh, u, ring)? {
             Ok(slots) => slots,
             Err(child) => return Ok(Applied::Blocked(child)),
@@ -264,7 +237,7 @@ impl EdgeMt {
         mesh: &mut CurrentMesh,
         u: UpdateId,
         ring: &mut Ring,
-    ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
+    ) -> Result<Result<[u32; 2], UpdateId>> {
         let update = u.0;
         if !self.has(u) {
             return Err(UpdateError::Missing { update });
@@ -290,22 +263,6 @@ impl EdgeMt {
             }
         }
         Ok(Ok(slots))
-    }
-
-    /// Shows `look` the tetrahedra that `u+` removes, in a mesh that contains `u`, until it returns true.
-    pub(in crate::mt) fn look_at_coarse_star(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
-        let mut ring = take_ring(mesh);
-        let found = self.collapsible(mesh, u, &mut ring);
-        if let Ok(Ok(slots)) = found {
-            look_at_halves(mesh, slots, &ring.halves, look);
-        }
-        mesh.put_back_kind_state(ring);
-        Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
     }
 }
 
@@ -369,11 +326,14 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
 
 impl UpdatePages for EdgeMt {
     fn page_bits(&self) -> u32 {
-        self.page_bits()
+        self.page_bits
     }
 
     fn set_to_come(&mut self, bounds: &[ErrorCode]) {
-        self.note_to_come(bounds);
+        self.to_come.clear();
+        if self.updates() < self.info.updates {
+            self.to_come.extend_from_slice(bounds);
+        }
     }
 
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
@@ -398,37 +358,21 @@ impl ApplyUpdates for EdgeMt {
         mesh.tets[t as usize].iter().filter_map(|&v| self.created_by(mesh.vertex(v))).max()
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
-        mesh.find_star(u, self.split_vertex(u), found)
+        mesh.find_star(u, self.split_vertex(u))
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         let [near, far] = self.created(u);
-        let start = found.len();
-        mesh.find_star(u, near, found)?;
-        let of_near = found.len();
-        mesh.find_star(u, far, found)?;
+        let mut found = mesh.find_star(u, near)?;
+        let of_far = mesh.find_star(u, far)?;
         let near = mesh.slot(near).unwrap_or(NONE);
-        let mut at = 0;
-        found.retain(|&t| {
-            at += 1;
-            // Those at both ends are there already.
-            at <= of_near || at <= start || !mesh.tets[t as usize].contains(&near)
-        });
-        Ok(())
+        // Those at both ends are there already.
+        found.extend(of_far.into_iter().filter(|&t| !mesh.tets[t as usize].contains(&near)));
+        Ok(found)
     }
 
     #[inline]
@@ -436,21 +380,23 @@ impl ApplyUpdates for EdgeMt {
         self.created(u).iter().all(|&v| mesh.slot(v).is_some())
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        self.apply_split(mesh, u)
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, ring| self.split(mesh, u, ring))
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        self.apply_collapse(mesh, u)
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, ring| self.collapse(mesh, u, ring))
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
-        self.look_at_coarse_star(mesh, u, look)
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, ring| {
+            let slots = match self.collapsible(mesh, u, ring)? {
+                Ok(slots) => slots,
+                Err(child) => return Ok(Applied::Blocked(child)),
+            };
+            look_at_halves(mesh, slots, &ring.halves, look);
+            Ok(Applied::Done)
+        })
     }
 
     fn site(&self, mesh: &CurrentMesh, u: UpdateId) -> [i32; 3] {

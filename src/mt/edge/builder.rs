@@ -1,14 +1,14 @@
 //! Makes an edge-based MT from plain vertex splits.
 
 use super::predict::Link;
-use super::star::take_ring;
+use super::star::Ring;
 use crate::mt::mesh::stars::Gather;
 use crate::mt::mesh::stars::Star;
 use crate::mt::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, EdgeUpdate, MAX_LINK, MtInfo,
+    ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, EdgeUpdate, MAX_LINK, MtInfo,
     MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexSplit,
 };
-use crate::mt::{MAX_STAR, VertexId};
+use crate::mt::{MAX_STAR, VertexId, apply_next};
 use std::borrow::Cow;
 
 /// Makes an [`EdgeMt`] from vertex splits, coarse to fine: applies each to the mesh of all before it and stores what it does as
@@ -60,11 +60,7 @@ impl EdgeMtBuilder {
         let u = mt.push(&stored)?;
         mt.updates_arrived(mesh, u.0);
         see(mt, mesh, u)?;
-        match mt.refine(mesh, u)? {
-            Applied::Done => mesh.clear_touched(),
-            // All updates with smaller numbers are applied, and only those can be in the way.
-            Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
-        }
+        apply_next(mt, mesh, u)?;
         Ok(u)
     }
 
@@ -87,26 +83,27 @@ fn to_residuals<'a>(
         return Err(UpdateError::OffLattice { update });
     }
     let p = mesh.slot(split.vertex).ok_or(UpdateError::Vertex { update, vertex: split.vertex.0 })?;
-    let mut ring = take_ring(mesh);
-    let gathered = match mesh.gather_ring(p, update, &mut ring) {
-        Ok(()) if ring.link_len > MAX_LINK || mesh.is_pinched(p) => Err(UpdateError::Star { update }),
-        Ok(()) if !ring.find_sides(split.mask) => Err(UpdateError::Mask { update }),
-        Ok(()) => Ok(()),
-        Err(Gather::TooLarge) => Err(UpdateError::Star { update }),
-        Err(Gather::Stopped(_)) => Err(UpdateError::Error { update }),
-    };
-    let stored = gathered.map(|()| {
-        let mut link = Link::new(&ring, mesh, mesh.positions[p as usize]);
-        let (offset_residual, edge) = link.residual_offset(&ring, split.offset, info.lattice.bits);
-        link.set_offset(&ring, split.offset);
-        link.guess_levels(&ring, mesh, p, split.offset, &info.fields, |field, guess| {
+    let stored = mesh.with_kind_state(|mesh, ring: &mut Ring| {
+        match mesh.gather_ring(p, update, ring) {
+            Ok(()) if ring.link_len > MAX_LINK || mesh.is_pinched(p) => {
+                return Err(UpdateError::Star { update });
+            }
+            Ok(()) if !ring.find_sides(split.mask) => return Err(UpdateError::Mask { update }),
+            Ok(()) => {}
+            Err(Gather::TooLarge) => return Err(UpdateError::Star { update }),
+            Err(Gather::Stopped(_)) => return Err(UpdateError::Error { update }),
+        }
+        let mut link = Link::new(ring, mesh, mesh.positions[p as usize]);
+        let (offset_residual, edge) = link.residual_offset(ring, split.offset, info.lattice.bits);
+        link.set_offset(ring, split.offset);
+        link.guess_levels(ring, mesh, p, split.offset, &info.fields, |field, guess| {
             residuals.push(split.field_offsets[field].saturating_sub(guess));
         });
-        let wrong_sides = link.wrong(&ring, ring.sides);
+        let wrong_sides = link.wrong(ring, ring.sides);
         let VertexSplit { vertex, errors, .. } = *split;
-        EdgeUpdate { vertex, offset_residual, edge, level_residuals: Cow::Borrowed(&[]), wrong_sides, errors }
+        let level_residuals = Cow::Borrowed(&[][..]);
+        Ok(EdgeUpdate { vertex, offset_residual, edge, level_residuals, wrong_sides, errors })
     });
-    mesh.put_back_kind_state(ring);
     Ok(EdgeUpdate { level_residuals: Cow::Borrowed(residuals), ..stored? })
 }
 

@@ -100,11 +100,6 @@ impl KindState for Ring {
     }
 }
 
-/// Lends the scratch space for splits and collapses.
-pub(super) fn take_ring(mesh: &mut CurrentMesh) -> Box<Ring> {
-    mesh.take_kind_state().unwrap_or_default()
-}
-
 impl Default for Ring {
     fn default() -> Self {
         Self {
@@ -462,10 +457,10 @@ mod tests {
     fn marks_of_long_ago_are_forgotten_when_the_epochs_start_again() {
         let mut mesh = wheel(20);
         for _ in 0..3 {
-            let mut ring = take_ring(&mut mesh);
-            assert!(mesh.gather_ring(0, 0, &mut ring).is_ok());
-            assert_eq!((ring.len, ring.link_len, mesh.epoch), (20, 21, 1));
-            mesh.put_back_kind_state(ring);
+            mesh.with_kind_state(|mesh, ring: &mut Ring| {
+                assert!(mesh.gather_ring(0, 0, ring).is_ok());
+                assert_eq!((ring.len, ring.link_len, mesh.epoch), (20, 21, 1));
+            });
             mesh.epoch = EPOCHS - 1;
         }
     }

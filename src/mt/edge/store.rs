@@ -82,9 +82,9 @@ pub struct EdgeMt {
     updates: u32,
     record: Record,
     /// By field; empty as long as nothing is known, and when all updates are here.
-    to_come: Vec<ErrorCode>,
+    pub(super) to_come: Vec<ErrorCode>,
     /// See [`UpdatePages::page_bits`].
-    page_bits: u32,
+    pub(super) page_bits: u32,
 }
 
 /// What the words of an update are: the vertex that it splits, `s(v')`, `s(v'')`, two for the mask, and as many as hold, bit by bit,
@@ -203,18 +203,6 @@ impl EdgeMt {
     #[doc(hidden)]
     pub fn set_page_bits(&mut self, bits: u32) {
         self.page_bits = bits;
-    }
-
-    pub(super) fn page_bits(&self) -> u32 {
-        self.page_bits
-    }
-
-    /// See [`UpdatePages::set_to_come`].
-    pub(super) fn note_to_come(&mut self, bounds: &[ErrorCode]) {
-        self.to_come.clear();
-        if self.updates() < self.info.updates {
-            self.to_come.extend_from_slice(bounds);
-        }
     }
 
     /// A bound of the errors of the updates that are not here yet, where one is known.

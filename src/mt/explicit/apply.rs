@@ -6,6 +6,7 @@
 
 use super::face_occupancy::{FaceOccupancy, faces};
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::{
     Applied, ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, ExplicitMt, LookAtTet, MultiTessellation,
@@ -15,24 +16,14 @@ use std::ops::Range;
 
 impl ExplicitMt {
     /// The slots of these tetrahedra, which must all be in the mesh.
-    fn slots(
-        mesh: &CurrentMesh,
-        update: u32,
-        tets: impl Iterator<Item = u32>,
-    ) -> Result<Vec<u32>, UpdateError> {
+    fn slots(mesh: &CurrentMesh, update: u32, tets: impl Iterator<Item = u32>) -> Result<Vec<u32>> {
         tets.map(|t| mesh.tagged(t).ok_or(UpdateError::Cavity { update })).collect()
     }
 }
 
 /// Replaces the tetrahedra in the slots `old` by those of `mt` that are numbered `new`. The mesh stays a mesh, or as
 /// it is: no face is taken twice from one side, and only what was next to the old ones gets other neighbours.
-fn replace(
-    mt: &ExplicitMt,
-    mesh: &mut CurrentMesh,
-    update: u32,
-    old: &[u32],
-    new: &[u32],
-) -> Result<(), UpdateError> {
+fn replace(mt: &ExplicitMt, mesh: &mut CurrentMesh, update: u32, old: &[u32], new: &[u32]) -> Result<()> {
     let torn = UpdateError::Cavity { update };
     let before: Vec<[u32; 4]> =
         old.iter().map(|&t| mesh.tets[t as usize].map(|slot| mesh.vertex(slot).0)).collect();
@@ -231,7 +222,7 @@ impl ApplyUpdates for ExplicitMt {
         self.inserted(u).all(|t| mesh.tagged(t).is_some())
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         let missing = self.removed(u).iter().find(|&&t| mesh.tagged(t).is_none());
         if let Some(&t) = missing {
             let damaged = UpdateError::Cavity { update: u.0 };
@@ -243,7 +234,7 @@ impl ApplyUpdates for ExplicitMt {
         Ok(Applied::Done)
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
         if let Some(child) = self.child_in_the_way(mesh, u)? {
             return Ok(Applied::Blocked(child));
         }
@@ -252,12 +243,7 @@ impl ApplyUpdates for ExplicitMt {
         Ok(Applied::Done)
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
         if let Some(child) = self.child_in_the_way(mesh, u)? {
             return Ok(Applied::Blocked(child));
         }
@@ -275,30 +261,18 @@ impl ApplyUpdates for ExplicitMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        found.extend(Self::slots(mesh, u.0, self.removed(u).iter().copied())?);
-        Ok(())
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
+        Self::slots(mesh, u.0, self.removed(u).iter().copied())
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        found.extend(Self::slots(mesh, u.0, self.inserted(u))?);
-        Ok(())
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
+        Self::slots(mesh, u.0, self.inserted(u))
     }
 }
 
 impl ExplicitMt {
     /// What removed something that `u+` inserted, in a mesh that contains `u`.
-    fn child_in_the_way(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<Option<UpdateId>, UpdateError> {
+    fn child_in_the_way(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<Option<UpdateId>> {
         let missing = self.inserted(u).find(|&t| mesh.tagged(t).is_none());
         let Some(t) = missing else { return Ok(None) };
         // Without a child to remove it, it was never there.

@@ -2,75 +2,57 @@
 
 use super::face_occupancy::{Faces, faces};
 use crate::geom::orient3d;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::ReplayError;
-use crate::mt::UpdateError;
 use crate::mt::margins::Margins;
-use crate::mt::{ExplicitMt, MultiTessellation, UpdateId, VertexId};
+use crate::mt::{ApplyUpdates, ExplicitMt, MultiTessellation, ReplayError, UpdateId, VertexId, apply_next};
 use std::collections::BTreeSet;
-use std::fmt;
+use thiserror::Error;
 
 /// Why an MT is not valid. `update` is the first one that is not; none means the base mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MtFault {
     /// An update comes before one that it depends on, or does not know its parents and children.
+    #[error("update {} contradicts the order of the MT", .update.0)]
     Order {
         /// The update.
         update: UpdateId,
     },
     /// An update has a larger error than one that it depends on.
+    #[error("update {} has a larger error than a parent", .update.0)]
     Error {
         /// The update.
         update: UpdateId,
     },
     /// An update has an error that is not as much below that of one it depends on as its values are beyond those which that one
     /// replaces: what a request for values gives would depend on what was asked for before.
+    #[error("update {} has an error too near to that of a parent", .update.0)]
     Margin {
         /// The update.
         update: UpdateId,
     },
     /// A tetrahedron is flat, inside out, or names a vertex that is not there.
+    #[error("{} has a tetrahedron that is not positive", place(.update))]
     Tetrahedron {
         /// The update that inserts it.
         update: Option<UpdateId>,
     },
     /// A face is shared by more than two tetrahedra, or by two on the same side of it.
+    #[error("a face is shared by too many tetrahedra in {}", place(.update))]
     Face {
         /// The update that makes it so.
         update: Option<UpdateId>,
     },
     /// What an update inserts does not fill what it removes: it tears the mesh open.
+    #[error("update {} tears the mesh open", .update.0)]
     Torn {
         /// The update.
         update: UpdateId,
     },
 }
 
-impl fmt::Display for MtFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let place = |update: &Option<UpdateId>| {
-            update.map_or("the base mesh".to_owned(), |u| format!("update {}", u.0))
-        };
-        match self {
-            Self::Order { update } => write!(f, "update {} contradicts the order of the MT", update.0),
-            Self::Error { update } => write!(f, "update {} has a larger error than a parent", update.0),
-            Self::Margin { update } => {
-                write!(f, "update {} has an error too near to that of a parent", update.0)
-            }
-            Self::Tetrahedron { update } => {
-                write!(f, "{} has a tetrahedron that is not positive", place(update))
-            }
-            Self::Face { update } => {
-                write!(f, "a face is shared by too many tetrahedra in {}", place(update))
-            }
-            Self::Torn { update } => write!(f, "update {} tears the mesh open", update.0),
-        }
-    }
+fn place(update: &Option<UpdateId>) -> String {
+    update.map_or("the base mesh".to_owned(), |u| format!("update {}", u.0))
 }
-
-impl std::error::Error for MtFault {}
 
 /// Checks that the errors of an MT fall along the partial order by as much as requests for values rely on, by applying all its
 /// updates. Returns the first update with a larger error than a parent, or one too near to it, if there is one.
@@ -81,19 +63,13 @@ pub fn check_errors(mt: &impl ApplyUpdates) -> Result<Option<MtFault>, ReplayErr
     let mut mesh = mt.start()?;
     mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
-    let mut tets = Vec::new();
     for update in (0..mt.updates()).map(UpdateId) {
-        tets.clear();
-        mt.find_removed(&mut mesh, update, &mut tets)?;
+        let tets = mt.find_removed(&mut mesh, update)?;
         if let Some(excess) = margins.check(mt, &mesh, update, &tets) {
             let fault = if excess.larger { MtFault::Error { update } } else { MtFault::Margin { update } };
             return Ok(Some(fault));
         }
-        if let Applied::Blocked(_) = mt.refine(&mut mesh, update)? {
-            // All updates with smaller numbers are applied, and only those can be in the way.
-            return Err(UpdateError::Error { update: update.0 }.into());
-        }
-        mesh.clear_touched();
+        apply_next(mt, &mut mesh, update)?;
     }
     Ok(None)
 }

@@ -283,17 +283,6 @@ impl ExplicitMt {
         self.created[u.0 as usize]..self.created[u.0 as usize + 1]
     }
 
-    /// Vertices and tetrahedra of the reference mesh (as far as it is known).
-    pub fn reference_counts(&self) -> [u32; 2] {
-        let mut used = vec![false; self.positions.len()];
-        let mut tets = 0;
-        for (tet, _) in self.tets.iter().zip(&self.remover).filter(|(_, u)| **u == NONE) {
-            tets += 1;
-            tet.iter().for_each(|&v| used[v as usize] = true);
-        }
-        [used.into_iter().filter(|&used| used).count() as u32, tets]
-    }
-
     /// Which tetrahedra `u+` inserts.
     pub fn inserted(&self, u: UpdateId) -> Range<u32> {
         self.inserted[u.0 as usize]..self.inserted[u.0 as usize + 1]

@@ -8,6 +8,7 @@ use super::star_code::{KnownStars, StarCode};
 use super::store::HalfEdgeMt;
 use crate::geom::orient3d;
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::mesh::KindState;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{Gather, Star};
@@ -41,10 +42,6 @@ impl KindState for State {
     }
 }
 
-fn take_state(mesh: &mut CurrentMesh) -> Box<State> {
-    mesh.take_kind_state().unwrap_or_default()
-}
-
 /// How far to go to name an update that has to come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Search {
@@ -54,9 +51,6 @@ enum Search {
     Everywhere,
 }
 
-/// A tetrahedron at a vertex, and which of its corners that is.
-type AtVertex = (u32, usize);
-
 impl HalfEdgeMt {
     /// Collects T_u, or returns what has to be applied first.
     fn collect_removed(
@@ -65,7 +59,7 @@ impl HalfEdgeMt {
         u: UpdateId,
         search: Search,
         scratch: &mut Scratch,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let update = u.0;
         let torn = UpdateError::Cavity { update };
         if !self.has(u) {
@@ -97,18 +91,18 @@ impl HalfEdgeMt {
         u: UpdateId,
         slot: u32,
         search: Search,
-    ) -> Result<Result<u32, UpdateId>, UpdateError> {
-        let star = mesh.all_around(slot);
-        if let Some(&(t, _)) = star.iter().find(|&&(t, _)| mesh.tag(t) == u.0) {
+    ) -> Result<Result<u32, UpdateId>> {
+        let mut star = Vec::new();
+        mesh.list_star(slot, &mut star);
+        if let Some(&t) = star.iter().find(|&&t| mesh.tag(t) == u.0) {
             return Ok(Ok(t));
         }
         let torn = UpdateError::Cavity { update: u.0 };
         let near = self.near(u).ok_or(torn.clone())?;
         let child = self.children_of(near).iter().find(|child| child.update == u.0).ok_or(torn.clone())?;
         // T_u will hold the direction in which the new vertex lies, if the domain does: what does so now has to go first.
-        let before = |&&(t, _): &&AtVertex| mesh.tag(t) < u.0;
-        let mut holding = star.iter().filter(|&&(t, at)| mesh.holds(t, at, child.offset));
-        if let Some(&(t, _)) = holding.find(before) {
+        let mut holding = star.into_iter().filter(|&t| mesh.holds(t, slot, child.offset));
+        if let Some(t) = holding.find(|&t| mesh.tag(t) < u.0) {
             return Ok(Err(UpdateId(mesh.tag(t))));
         }
         match search {
@@ -118,7 +112,7 @@ impl HalfEdgeMt {
     }
 
     /// A parent of `u` that is not in the mesh, found by applying all updates before `u` to another one.
-    fn find_parent(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<UpdateId, UpdateError> {
+    fn find_parent(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<UpdateId> {
         let torn = UpdateError::Cavity { update: u.0 };
         let mut other = self.start().map_err(|_| torn.clone())?;
         let mut state = Box::<State>::default();
@@ -175,12 +169,7 @@ impl HalfEdgeMt {
     }
 
     /// Positions and levels of the new vertex.
-    fn place_vertex(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        scratch: &mut Scratch,
-    ) -> Result<[i32; 3], UpdateError> {
+    fn place_vertex(&self, mesh: &CurrentMesh, u: UpdateId, scratch: &mut Scratch) -> Result<[i32; 3]> {
         let off = UpdateError::OffLattice { update: u.0 };
         let near = mesh.vertex(scratch.link[0]);
         let children = self.children_of(near);
@@ -204,7 +193,7 @@ impl HalfEdgeMt {
         u: UpdateId,
         search: Search,
         scratch: &mut Scratch,
-    ) -> Result<Result<[i32; 3], UpdateId>, UpdateError> {
+    ) -> Result<Result<[i32; 3], UpdateId>> {
         if let Applied::Blocked(before) = self.collect_removed(mesh, u, search, scratch)? {
             return Ok(Err(before));
         }
@@ -225,7 +214,7 @@ impl HalfEdgeMt {
         u: UpdateId,
         search: Search,
         state: &mut State,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let State { scratch, code, known } = state;
         let position = match self.prepare(mesh, u, search, scratch)? {
             Ok(position) => position,
@@ -290,7 +279,7 @@ impl HalfEdgeMt {
         mesh: &mut CurrentMesh,
         u: UpdateId,
         star: &mut Star,
-    ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
+    ) -> Result<Result<[u32; 2], UpdateId>> {
         let vertex = self.vertex(u).0;
         let absent = UpdateError::Vertex { update: u.0, vertex };
         let slot = mesh.slot(VertexId(vertex)).ok_or(absent.clone())?;
@@ -306,12 +295,7 @@ impl HalfEdgeMt {
         Ok(Ok([slot, near]))
     }
 
-    fn remove(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        scratch: &mut Scratch,
-    ) -> Result<Applied, UpdateError> {
+    fn remove(&self, mesh: &mut CurrentMesh, u: UpdateId, scratch: &mut Scratch) -> Result<Applied> {
         let star = &mut scratch.gathered;
         let [slot, near] = match self.collect_inserted(mesh, u, star)? {
             Ok(slots) => slots,
@@ -365,7 +349,7 @@ impl CurrentMesh {
         slot: u32,
         first: u32,
         scratch: &mut Scratch,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let torn = || UpdateError::Cavity { update };
         self.next_epoch();
         self.number_tet(first, 0);
@@ -405,26 +389,9 @@ impl CurrentMesh {
         Ok(Applied::Done)
     }
 
-    /// All tetrahedra around the vertex in `slot`, however many, each with the corner that it is.
-    pub(super) fn all_around(&mut self, slot: u32) -> Vec<AtVertex> {
-        self.next_epoch();
-        let first = self.incident[slot as usize];
-        let mut star = vec![(first, corner_of(&self.tets[first as usize], slot))];
-        self.number_tet(first, 0);
-        let mut next = 0;
-        while let Some(&(t, at)) = star.get(next) {
-            next += 1;
-            for (face, n) in self.neighbors[t as usize].into_iter().enumerate() {
-                if face != at && n != NONE && self.number_tet(n, 0).is_none() {
-                    star.push((n, corner_of(&self.tets[n as usize], slot)));
-                }
-            }
-        }
-        star
-    }
-
-    /// Whether a direction from corner `at` of tetrahedron `t` leads into it, or along a face.
-    fn holds(&self, t: u32, at: usize, direction: [i32; 3]) -> bool {
+    /// Whether a direction from the corner in `slot` of tetrahedron `t` leads into it, or along a face.
+    fn holds(&self, t: u32, slot: u32, direction: [i32; 3]) -> bool {
+        let at = corner_of(&self.tets[t as usize], slot);
         let corners = self.tets[t as usize].map(|v| self.positions[v as usize]);
         let point = [0, 1, 2].map(|k| corners[at][k].saturating_add(direction[k]));
         let largest = 1 << crate::geom::WIDE_BITS;
@@ -469,7 +436,10 @@ impl UpdatePages for HalfEdgeMt {
     }
 
     fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
-        self.take_page(page)
+        let gone = self.pages.remove(page).ok_or(PageError::Absent { page })?;
+        self.facts = None;
+        self.forget_children(gone.children.items());
+        Ok(())
     }
 
     fn update_bytes(&self) -> u64 {
@@ -483,7 +453,7 @@ impl UpdatePages for HalfEdgeMt {
 
     fn awaited_errors(&self, mesh: &CurrentMesh, t: u32) -> Option<&[ErrorCode]> {
         match mesh.tag(t) {
-            NONE => Some(self.no_errors()),
+            NONE => Some(&self.zeros),
             u if self.has(UpdateId(u)) => None,
             u => Some(self.bounds_of(UpdateId(u))),
         }
@@ -533,37 +503,24 @@ impl ApplyUpdates for HalfEdgeMt {
         mesh.is_newest_nearby(self.vertex(u))
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let applied = self.insert(mesh, u, Search::Everywhere, &mut state);
-        mesh.put_back_kind_state(state);
-        applied
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, state| self.insert(mesh, u, Search::Everywhere, state))
     }
 
-    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let applied = self.insert(mesh, u, Search::Nearby, &mut state);
-        mesh.put_back_kind_state(state);
-        applied
+    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, state| self.insert(mesh, u, Search::Nearby, state))
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let applied = self.remove(mesh, u, &mut state.scratch);
-        mesh.put_back_kind_state(state);
-        applied
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, State { scratch, .. }| self.remove(mesh, u, scratch))
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
-        let mut state = take_state(mesh);
-        let star = &mut state.scratch.gathered;
-        let found = self.collect_inserted(mesh, u, star);
-        if let Ok(Ok([slot, near])) = found {
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, State { scratch: Scratch { gathered: star, .. }, .. }| {
+            let [slot, near] = match self.collect_inserted(mesh, u, star)? {
+                Ok(slots) => slots,
+                Err(child) => return Ok(Applied::Blocked(child)),
+            };
             let tets = star.tets[..star.len].iter().map(|&t| mesh.tets[t as usize]);
             for tet in tets.filter(|tet| !tet.contains(&near)) {
                 let tet = tet.map(|v| if v == slot { near } else { v });
@@ -572,9 +529,8 @@ impl ApplyUpdates for HalfEdgeMt {
                     break;
                 }
             }
-        }
-        mesh.put_back_kind_state(state);
-        Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
+            Ok(Applied::Done)
+        })
     }
 
     /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
@@ -582,30 +538,16 @@ impl ApplyUpdates for HalfEdgeMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        let mut state = take_state(mesh);
-        let collected = self.collect_removed(mesh, u, Search::Everywhere, &mut state.scratch);
-        if collected == Ok(Applied::Done) {
-            found.extend_from_slice(&state.scratch.removed[..state.scratch.removed_len]);
-        }
-        mesh.put_back_kind_state(state);
-        match collected? {
-            Applied::Done => Ok(()),
-            Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
-        }
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
+        mesh.with_kind_state(|mesh, State { scratch, .. }| {
+            match self.collect_removed(mesh, u, Search::Everywhere, scratch)? {
+                Applied::Done => Ok(scratch.removed[..scratch.removed_len].to_vec()),
+                Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
+            }
+        })
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        mesh.find_star(u, self.vertex(u), found)
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
+        mesh.find_star(u, self.vertex(u))
     }
 }

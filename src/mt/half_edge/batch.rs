@@ -253,8 +253,9 @@ impl Batch {
         let first = match mesh.tagged(update) {
             Some(t) => t,
             None => {
-                let around = mesh.all_around(slot);
-                around.into_iter().find(|&(t, _)| mesh.tag(t) == update).ok_or_else(refused)?.0
+                let mut around = Vec::new();
+                mesh.list_star(slot, &mut around);
+                around.into_iter().find(|&t| mesh.tag(t) == update).ok_or_else(refused)?
             }
         };
         match mesh.collect_tagged(update, slot, first, scratch).map_err(damaged)? {

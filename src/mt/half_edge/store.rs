@@ -24,6 +24,7 @@
 //! consistent set.
 
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::facts::MtFacts;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::pages::{Page, Pages, Rows};
@@ -80,8 +81,8 @@ pub struct HalfEdgeMt {
     /// Page by page and field by field, what bounds the errors of a page that is not here.
     bounds: Vec<ErrorCode>,
     /// One for each field.
-    zeros: Vec<ErrorCode>,
-    facts: Option<Box<MtFacts>>,
+    pub(super) zeros: Vec<ErrorCode>,
+    pub(super) facts: Option<Box<MtFacts>>,
 }
 
 /// Two MTs are equal if they have the same updates, whatever their pages.
@@ -100,7 +101,7 @@ impl PartialEq for HalfEdgeMt {
 /// Updates that come and go together.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HalfEdgePage {
-    children: Rows<ForestChild>,
+    pub(super) children: Rows<ForestChild>,
     stars: Rows<u8>,
     level_residuals: Vec<i32>,
     errors: Errors,
@@ -149,7 +150,7 @@ impl HalfEdgeMt {
         marks: Vec<BaseMark>,
         children: &[Vec<ForestChild>],
         page_bits: u32,
-    ) -> Result<Self, UpdateError> {
+    ) -> Result<Self> {
         let known = |mark: &BaseMark| mark.remover < info.updates || mark.remover == NONE;
         let fits = marks.len() == base.tets.len() && children.len() == base.positions.len();
         if !fits || !marks.iter().all(known) {
@@ -176,12 +177,7 @@ impl HalfEdgeMt {
     }
 
     /// Children come after the update that they are stored with, in ascending order.
-    fn check_children(
-        &self,
-        update: u32,
-        after: Option<u32>,
-        row: &[ForestChild],
-    ) -> Result<(), UpdateError> {
+    fn check_children(&self, update: u32, after: Option<u32>, row: &[ForestChild]) -> Result<()> {
         let rising = row.windows(2).all(|pair| pair[0].update < pair[1].update);
         let first = row.first().is_none_or(|child| after.is_none_or(|after| child.update > after));
         let known = row.last().is_none_or(|child| child.update < self.info.updates);
@@ -194,7 +190,7 @@ impl HalfEdgeMt {
     }
 
     /// Checks what does not need the mesh.
-    fn check(&self, update: u32, new: &HalfEdgeUpdate<'_>) -> Result<(), UpdateError> {
+    fn check(&self, update: u32, new: &HalfEdgeUpdate<'_>) -> Result<()> {
         self.check_children(update, Some(update), new.children)?;
         let fields = &self.info.fields;
         let fits = |(residual, bits): (&i32, u32)| residual.unsigned_abs() < 1 << (bits + 1);
@@ -210,7 +206,7 @@ impl HalfEdgeMt {
     /// # Errors
     /// Children must come later, be on the lattice and of no other vertex, and each field has a level and an error. What needs
     /// the mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see to.
-    pub fn push(&mut self, new: &HalfEdgeUpdate<'_>) -> Result<UpdateId, UpdateError> {
+    pub fn push(&mut self, new: &HalfEdgeUpdate<'_>) -> Result<UpdateId> {
         let update = self.updates();
         if update >= self.info.updates {
             return Err(UpdateError::Error { update });
@@ -227,7 +223,7 @@ impl HalfEdgeMt {
     ///
     /// # Errors
     /// If an update is not here.
-    pub fn in_pages(&self, page_bits: u32) -> Result<Self, UpdateError> {
+    pub fn in_pages(&self, page_bits: u32) -> Result<Self> {
         let vertices = (0..self.base.positions.len() as u32).map(VertexId);
         let children: Vec<Vec<ForestChild>> = vertices.map(|v| self.children_of(v).to_vec()).collect();
         let (info, base) = (self.info.clone(), self.base.clone());
@@ -239,7 +235,7 @@ impl HalfEdgeMt {
     }
 
     /// Notes the near vertex of these updates, none of which has another one. As before if one has.
-    fn note_children(&mut self, vertex: u32, children: &[ForestChild]) -> Result<(), UpdateError> {
+    fn note_children(&mut self, vertex: u32, children: &[ForestChild]) -> Result<()> {
         if let Some(child) = children.iter().find(|child| self.near.get(child.update) != NONE) {
             return Err(UpdateError::Vertex { update: child.update, vertex });
         }
@@ -247,7 +243,7 @@ impl HalfEdgeMt {
         Ok(())
     }
 
-    fn forget_children(&mut self, children: &[ForestChild]) {
+    pub(super) fn forget_children(&mut self, children: &[ForestChild]) {
         children.iter().for_each(|child| self.near.set(child.update, NONE));
     }
 
@@ -284,18 +280,6 @@ impl HalfEdgeMt {
         Ok(())
     }
 
-    /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
-    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction).
-    ///
-    /// # Errors
-    /// If the page is not here.
-    pub(super) fn take_page(&mut self, page: u32) -> Result<(), PageError> {
-        let gone = self.pages.remove(page).ok_or(PageError::Absent { page })?;
-        self.facts = None;
-        self.forget_children(gone.children.items());
-        Ok(())
-    }
-
     /// Tells what bounds the errors of the updates of each page, page by page and field by field, for as long as a page is not
     /// here.
     pub fn set_page_bounds(&mut self, bounds: Vec<ErrorCode>) {
@@ -304,15 +288,11 @@ impl HalfEdgeMt {
 
     /// What bounds the errors of update `u`, field by field, which is not here.
     #[inline]
-    pub(in crate::mt) fn bounds_of(&self, u: UpdateId) -> &[ErrorCode] {
+    pub(super) fn bounds_of(&self, u: UpdateId) -> &[ErrorCode] {
         let fields = self.zeros.len();
         let at = self.pages.page_of(u.0) as usize * fields;
         // A page without bounds has those of the first entries.
         self.bounds.get(at..at + fields).or_else(|| self.bounds.get(..fields)).unwrap_or(&self.zeros)
-    }
-
-    pub(in crate::mt) fn no_errors(&self) -> &[ErrorCode] {
-        &self.zeros
     }
 
     /// For each base tetrahedron, what removes it.

@@ -297,6 +297,18 @@ impl CurrentMesh {
         state.downcast().ok()
     }
 
+    /// Lends it to `work`; a new one if it is not there, or of another kind.
+    #[inline]
+    pub(in crate::mt) fn with_kind_state<T: KindState + Default, R>(
+        &mut self,
+        work: impl FnOnce(&mut Self, &mut T) -> R,
+    ) -> R {
+        let mut state = self.take_kind_state::<T>().unwrap_or_default();
+        let done = work(self, &mut state);
+        self.put_back_kind_state(state);
+        done
+    }
+
     pub(in crate::mt) fn put_back_kind_state<T: KindState>(&mut self, state: Box<T>) {
         self.kind_state = Some(state);
     }
@@ -516,20 +528,9 @@ impl CurrentMesh {
     /// A free or new tetrahedron slot, to be filled by the caller.
     #[inline]
     pub(crate) fn new_tet(&mut self) -> u32 {
-        let t = self.free_tets.pop().unwrap_or_else(|| {
-            self.tets.push([NONE; 4]);
-            self.neighbors.push([NONE; 4]);
-            self.marks.push(0);
-            if self.is_tagged() {
-                self.tags.push(NONE);
-            }
-            if self.has_tet_bytes {
-                self.tet_bytes.push(0);
-            }
-            self.tets.len() as u32 - 1
-        });
-        self.changed_tets.mark(t);
-        t
+        let mut slots = [NONE];
+        self.new_tets(&mut slots);
+        slots[0]
     }
 
     pub(crate) fn free_tet(&mut self, t: u32) {

@@ -85,19 +85,17 @@ impl CurrentMesh {
         Ok(())
     }
 
-    /// Appends the tetrahedra around a vertex of the MT, for update `u`.
+    /// The tetrahedra around a vertex of the MT, for update `u`.
     pub(in crate::mt) fn find_star(
         &mut self,
         u: UpdateId,
         vertex: VertexId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
+    ) -> Result<Vec<u32>, UpdateError> {
         let update = u.0;
         let slot = self.slot(vertex).ok_or(UpdateError::Vertex { update, vertex: vertex.0 })?;
         let mut star = Star::default();
         self.gather_star(slot, &mut star, |_, _| None::<()>).map_err(|_| UpdateError::Star { update })?;
-        found.extend_from_slice(&star.tets[..star.len]);
-        Ok(())
+        Ok(star.tets[..star.len].to_vec())
     }
 
     /// Touches the tetrahedra around the vertex in `slot`, however many, as far as they hang together through faces.
@@ -130,13 +128,7 @@ impl CurrentMesh {
     /// [`GATHERED`].
     #[inline]
     pub(in crate::mt) fn number_tet(&mut self, t: u32, number: u32) -> Option<u32> {
-        let mark = self.epoch << MARK_BITS;
-        let old = std::mem::replace(&mut self.marks[t as usize], mark | number);
-        if old & !MARK_MASK != mark {
-            return None;
-        }
-        self.marks[t as usize] = old;
-        Some(old & MARK_MASK)
+        number_once(&mut self.marks[t as usize], self.epoch, number)
     }
 
     /// The number that tetrahedron `t` has got since [`Self::next_epoch`], if it has one.
@@ -150,13 +142,7 @@ impl CurrentMesh {
     /// [`GATHERED`].
     #[inline]
     pub(in crate::mt) fn number_slot(&mut self, slot: u32, number: u32) -> Option<u32> {
-        let mark = self.epoch << MARK_BITS;
-        let old = std::mem::replace(&mut self.vertex_marks[slot as usize], mark | number);
-        if old & !MARK_MASK != mark {
-            return None;
-        }
-        self.vertex_marks[slot as usize] = old;
-        Some(old & MARK_MASK)
+        number_once(&mut self.vertex_marks[slot as usize], self.epoch, number)
     }
 
     /// Forgets all marks and numbers of tetrahedra and vertices.
@@ -255,6 +241,17 @@ impl CurrentMesh {
         let [a, b, c, d] = self.neighbors[t as usize].map(|n| u8::from(n == towards));
         (a | b | c | d != 0).then_some((b + 2 * c + 3 * d) & 3)
     }
+}
+
+/// The number in a mark of this epoch; a mark of another one gets `number`.
+#[inline]
+fn number_once(own: &mut u32, epoch: u32, number: u32) -> Option<u32> {
+    let mark = epoch << MARK_BITS;
+    if *own & !MARK_MASK == mark {
+        return Some(*own & MARK_MASK);
+    }
+    *own = mark | number;
+    None
 }
 
 #[cfg(test)]

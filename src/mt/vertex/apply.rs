@@ -4,7 +4,7 @@
 //! tag is the number of that child of the tetrahedron's creator.
 
 use super::bit_string::width_of;
-use super::cavity::{Cavity, SLOTS, Wall, with_cavity};
+use super::cavity::{Cavity, SLOTS, Wall};
 use super::cavity_fill::{Across, Close, Face, turned};
 use super::limits::{COUNT_BITS, MAX_AROUND, MAX_INSERTED};
 use super::shape_code::{Code, write_given_up};
@@ -14,6 +14,7 @@ use super::streaming::Insertion;
 use super::tet_errors::{Packed, QUARTERING_BITS};
 use crate::geom::{NARROW_BITS, orient3d};
 use crate::mesh::NONE;
+use crate::mt::error::Result;
 use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{GATHERED, Gather};
@@ -101,7 +102,7 @@ impl VertexMt {
         u: UpdateId,
         removed: usize,
         cavity: &mut Cavity,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let Cavity { tets, bare, .. } = cavity;
         let gathered = mesh.tagged(u.0).and_then(|first| mesh.gather_tagged(first, u.0, tets, bare));
         let (found, bare_len) = gathered.unwrap_or((0, 0));
@@ -113,12 +114,7 @@ impl VertexMt {
         Ok(Applied::Done)
     }
 
-    fn insert(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        cavity: &mut Cavity,
-    ) -> Result<Applied, UpdateError> {
+    fn insert(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Result<Applied> {
         let torn = UpdateError::Cavity { update: u.0 };
         let shape = self.shape(u);
         if let blocked @ Applied::Blocked(_) = self.gather_removed(mesh, u, shape.removed, cavity)? {
@@ -141,13 +137,7 @@ impl VertexMt {
 
     /// Finds which update removes each tetrahedron of the new star.
     #[inline]
-    fn find_tags(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        shape: &Shape,
-        cavity: &mut Cavity,
-    ) -> Result<(), UpdateError> {
+    fn find_tags(&self, mesh: &CurrentMesh, u: UpdateId, shape: &Shape, cavity: &mut Cavity) -> Result<()> {
         let walls = cavity.walls_len;
         if shape.children == 0 && self.growing.is_none() {
             cavity.tags[..walls].fill(NONE);
@@ -301,7 +291,7 @@ impl VertexMt {
         mesh: &mut CurrentMesh,
         new: &Insertion<'_>,
         cavity: &mut Cavity,
-    ) -> Result<(), UpdateError> {
+    ) -> Result<()> {
         let u = UpdateId(self.updates());
         let torn = UpdateError::Cavity { update: u.0 };
         let on_boundary = self.open(mesh, new, cavity).ok_or(torn.clone())?;
@@ -421,7 +411,7 @@ impl VertexMt {
         u: UpdateId,
         cavity: &mut Cavity,
         build: impl FnOnce(&CurrentMesh, &mut Cavity) -> Option<()>,
-    ) -> Result<Applied, UpdateError> {
+    ) -> Result<Applied> {
         let vertex = self.vertex(u);
         let torn = UpdateError::Cavity { update: u.0 };
         let absent = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
@@ -630,12 +620,12 @@ impl ApplyUpdates for VertexMt {
         mesh.is_newest_nearby(self.vertex(u))
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| self.insert(mesh, u, cavity))
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, cavity| self.insert(mesh, u, cavity))
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity));
             if rebuilt == Ok(Applied::Done) {
                 self.perform_removal(mesh, u, cavity, |_| u.0);
@@ -644,13 +634,8 @@ impl ApplyUpdates for VertexMt {
         })
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity));
             if rebuilt == Ok(Applied::Done) {
                 show_built(mesh, cavity, self.kept_quarterings(u, cavity), look);
@@ -664,27 +649,16 @@ impl ApplyUpdates for VertexMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
+        mesh.with_kind_state(|mesh, cavity| {
             let Applied::Done = self.gather_removed(mesh, u, self.shape(u).removed, cavity)? else {
                 return Err(UpdateError::Error { update: u.0 });
             };
-            found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
-            Ok(())
+            Ok(cavity.tets[..cavity.tets_len].to_vec())
         })
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        mesh.find_star(u, self.vertex(u), found)
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
+        mesh.find_star(u, self.vertex(u))
     }
 }

@@ -80,18 +80,6 @@ impl KindState for Cavity {
     }
 }
 
-/// Does something with the scratch space that a mesh has.
-#[inline]
-pub(in crate::mt) fn with_cavity<T>(
-    mesh: &mut CurrentMesh,
-    work: impl FnOnce(&mut CurrentMesh, &mut Cavity) -> T,
-) -> T {
-    let mut cavity: Box<Cavity> = mesh.take_kind_state().unwrap_or_default();
-    let done = work(mesh, &mut cavity);
-    mesh.put_back_kind_state(cavity);
-    done
-}
-
 /// A hash of the tetrahedra that an insertion removed, which the mesh keeps with the vertex (its [`KindWord`](crate::mt::mesh::current::KindWord)). What the removal of the vertex puts
 /// back must have the same one. So a mesh is always one that insertions alone lead to; a code that names other
 /// tetrahedra than those which were there could make ones that the rest of the mesh, if it overlaps, has already.

@@ -4,7 +4,6 @@
 //! beside the nodes; then they move into them.
 
 use super::bit_string::{Bits, width_of};
-use super::cavity::with_cavity;
 use super::growing::Growing;
 use super::limits::MAX_REMOVED;
 use crate::mesh::NONE;
@@ -73,7 +72,7 @@ impl VertexMt {
         if !self.info.holds(new.position, new.levels) {
             return Err(UpdateError::OffLattice { update });
         }
-        with_cavity(mesh, |mesh, cavity| self.insert_next(mesh, new, cavity))?;
+        mesh.with_kind_state(|mesh, cavity| self.insert_next(mesh, new, cavity))?;
         self.set_own_fall(UpdateId(update), new.own_fall);
         if self.updates() == self.info.updates {
             self.pack()?;

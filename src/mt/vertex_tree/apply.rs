@@ -8,11 +8,12 @@ use super::store::VertexTreeMt;
 use super::tree_code::{Label, Tree, facets};
 use crate::geom::{NARROW_BITS, orient3d};
 use crate::mesh::{FACES, NONE};
+use crate::mt::error::Result;
 use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::stars::BARE;
 use crate::mt::vertex::apply::show_built;
 use crate::mt::vertex::bit_string::width_of;
-use crate::mt::vertex::cavity::{Cavity, with_cavity};
+use crate::mt::vertex::cavity::Cavity;
 use crate::mt::vertex::cavity_fill::Face;
 use crate::mt::vertex::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 use crate::mt::{
@@ -132,12 +133,7 @@ impl VertexTreeMt {
         Some(())
     }
 
-    fn insert(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        cavity: &mut Cavity,
-    ) -> Result<Applied, UpdateError> {
+    fn insert(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Result<Applied> {
         let torn = UpdateError::Cavity { update: u.0 };
         if let Some(parent) = self.missing_parent(mesh, u) {
             return Ok(Applied::Blocked(parent));
@@ -179,12 +175,7 @@ impl VertexTreeMt {
         rebuild(&tree, hole, apexes, &mut cavity.fill)
     }
 
-    fn rebuild(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        cavity: &mut Cavity,
-    ) -> Result<Applied, UpdateError> {
+    fn rebuild(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Result<Applied> {
         self.loops.rebuild(mesh, u, cavity, |mesh, cavity| self.build_removed(mesh, u, cavity))
     }
 
@@ -237,12 +228,12 @@ impl ApplyUpdates for VertexTreeMt {
         self.loops.may_coarsen(mesh, u)
     }
 
-    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| self.insert(mesh, u, cavity))
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, cavity| self.insert(mesh, u, cavity))
     }
 
-    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity);
             if rebuilt == Ok(Applied::Done) {
                 // The first tetrahedron of the stream is t_u.
@@ -252,13 +243,8 @@ impl ApplyUpdates for VertexTreeMt {
         })
     }
 
-    fn look_at_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        look: LookAtTet<'_>,
-    ) -> Result<Applied, UpdateError> {
-        with_cavity(mesh, |mesh, cavity| {
+    fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
+        mesh.with_kind_state(|mesh, cavity| {
             let rebuilt = self.rebuild(mesh, u, cavity);
             if rebuilt == Ok(Applied::Done) {
                 show_built(mesh, cavity, None, look);
@@ -272,28 +258,17 @@ impl ApplyUpdates for VertexTreeMt {
         [0; 3]
     }
 
-    fn find_removed(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
+    fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         if self.missing_parent(mesh, u).is_some() {
             return Err(UpdateError::Error { update: u.0 });
         }
-        with_cavity(mesh, |mesh, cavity| {
+        mesh.with_kind_state(|mesh, cavity| {
             self.recognise(mesh, u, cavity).ok_or(UpdateError::Cavity { update: u.0 })?;
-            found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
-            Ok(())
+            Ok(cavity.tets[..cavity.tets_len].to_vec())
         })
     }
 
-    fn find_inserted(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        found: &mut Vec<u32>,
-    ) -> Result<(), UpdateError> {
-        mesh.find_star(u, self.vertex(u), found)
+    fn find_inserted(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
+        mesh.find_star(u, self.vertex(u))
     }
 }

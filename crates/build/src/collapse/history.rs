@@ -114,8 +114,7 @@ impl Found {
     /// Records an update before it is applied.
     fn note(&mut self, mt: &EdgeMt, mesh: &mut CurrentMesh, u: UpdateId) -> Result<(), UpdateError> {
         let vertex = mt.update(u).vertex;
-        let mut star = Vec::new();
-        mt.find_removed(mesh, u, &mut star)?;
+        let star = mt.find_removed(mesh, u)?;
         let (mut parents, mut beyond) = (Vec::new(), Vec::new());
         self.margins.next(mt, mesh, &star, &mut parents, &mut beyond);
         let corners: Vec<u32> =

@@ -2,12 +2,11 @@
 
 use crate::support::meshes::{cube, hilly};
 use std::io::Cursor;
-use tetralod::client::{Client, ClientError, ClientOptions};
-use tetralod::format::{EncodeOptions, ExactStatus, FormatError, encode};
+use tetralod::format::{DecodeOptions, EncodeOptions, ExactStatus, FormatError, encode};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{MtKind, VertexId};
 use tetralod::refine::Request;
-use tetralod::session::{Session, SessionError};
+use tetralod::session::{Client, ClientError, Session, SessionError};
 use tetralod::stream::FileSource;
 use tetralod_build::{BuildConfig, BuildResult, build};
 
@@ -22,7 +21,7 @@ fn file(mesh: &TetMesh) -> (Vec<u8>, Vec<VertexId>) {
 
 fn open(bytes: &[u8]) -> Client<FileSource<Cursor<Vec<u8>>>> {
     let source = FileSource::new(Cursor::new(bytes.to_vec())).expect("it can be read");
-    Client::open(source, ClientOptions::default()).expect("a sound file")
+    Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file")
 }
 
 /// How many vertices of the current mesh have just the value of the input, of how many that belong to it.
@@ -52,9 +51,9 @@ fn a_client_has_exact_values_when_it_has_fetched_them() {
     }
     assert_eq!(exact(client.session(), &mesh, &vertices)[1], mesh.positions.len());
     // Once they are here, nothing more is fetched.
-    let before = client.fetched();
+    let before = client.session().fetched();
     client.fetch_exact().expect("a sound file");
-    assert_eq!(client.fetched(), before);
+    assert_eq!(client.session().fetched(), before);
     // What is damaged is refused, and the mesh stays.
     let range = client.session().decoder().exact_range().expect("there are exact values");
     let mut damaged = bytes.clone();
@@ -73,10 +72,10 @@ fn a_file_without_exact_values_has_no_range_of_them() {
     let bytes = encode(&built.mt, &EncodeOptions::default()).expect("a sound MT");
     let mut client = open(&bytes);
     client.refine(&Request::within(0.0)).expect("a sound file");
-    let before = client.fetched();
+    let before = client.session().fetched();
     client.fetch_exact().expect("nothing to fetch");
-    assert_eq!((client.session().decoder().exact_range(), client.fetched()), (None, before));
-    assert!(client.session_mut().take_exact(&[]).is_err());
+    assert_eq!((client.session().decoder().exact_range(), client.session().fetched()), (None, before));
+    assert!(client.into_session().take_exact(&[]).is_err());
 }
 
 #[test]

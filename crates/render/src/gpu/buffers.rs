@@ -1,5 +1,6 @@
 //! Typed buffers that grow.
 
+use crate::gpu::error::Result;
 use crate::gpu::{Context, GpuError};
 use bytemuck::Pod;
 use std::borrow::Cow;
@@ -26,7 +27,7 @@ impl<T: Pod> GrowBuffer<T> {
     }
 
     /// Replaces the contents.
-    pub(super) fn write(&mut self, context: &Context, items: &[T]) -> Result<(), GpuError> {
+    pub(super) fn write(&mut self, context: &Context, items: &[T]) -> Result<()> {
         self.clear();
         self.update(context, items, &[])
     }
@@ -38,12 +39,7 @@ impl<T: Pod> GrowBuffer<T> {
 
     /// Makes the contents `items`, which differ from what is there in these ranges only, and in what lies beyond its end.
     /// When the buffer has to grow, all is written.
-    pub(super) fn update(
-        &mut self,
-        context: &Context,
-        items: &[T],
-        changed: &[Range<u32>],
-    ) -> Result<(), GpuError> {
+    pub(super) fn update(&mut self, context: &Context, items: &[T], changed: &[Range<u32>]) -> Result<()> {
         self.update_with(context, items.len(), changed, |range| Cow::Borrowed(&items[range]))
     }
 
@@ -54,7 +50,7 @@ impl<T: Pod> GrowBuffer<T> {
         len: usize,
         changed: &[Range<u32>],
         items: impl Fn(Range<usize>) -> Cow<'a, [T]>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<()> {
         self.reserve(context, len)?;
         let Some(buffer) = &self.buffer else { return Ok(()) };
         for range in uploads(changed, self.len, len) {
@@ -66,7 +62,7 @@ impl<T: Pod> GrowBuffer<T> {
     }
 
     /// Makes room for so many items; what is there is lost if there is not.
-    fn reserve(&mut self, context: &Context, len: usize) -> Result<(), GpuError> {
+    fn reserve(&mut self, context: &Context, len: usize) -> Result<()> {
         let bytes = (len * size_of::<T>()) as u64;
         if bytes <= self.buffer.as_ref().map_or(0, wgpu::Buffer::size) {
             return Ok(());

@@ -36,9 +36,7 @@ impl CellPass {
         let groups = [Some(&layout)];
         let pipeline = |vertex, fragment, only_front| {
             let output = Output::Opaque { only_front };
-            let spec =
-                PipelineSpec { shader: "cells", vertex, fragment, buffers: &[], groups: &groups, output };
-            spec.create(context, common)
+            PipelineSpec::new("cells", [vertex, fragment], &groups, output).create(context, common)
         };
         Self {
             solid: pipeline("vs", "fs", true),

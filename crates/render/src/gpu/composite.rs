@@ -110,18 +110,11 @@ impl Composite {
     pub(super) fn prepare(&mut self, context: &Context, common: &Common, lists: &FragmentLists) {
         let over = Output::Over(wgpu::CompareFunction::Always);
         let groups = [Some(&self.layout)];
-        let spec = PipelineSpec {
-            shader: "composite",
-            vertex: "vs",
-            fragment: "fs",
-            buffers: &[],
-            groups: &groups,
-            output: over,
-        };
+        let spec = PipelineSpec::new("composite", ["vs", "fs"], &groups, over);
         self.all.get_or_insert_with(|| spec.create(context, common));
         let groups = [Some(&self.entries_layout), Some(&lists.layout)];
         let output = Output::List { only_front: true };
-        let spec = PipelineSpec { shader: "volume_entries", groups: &groups, output, ..spec };
+        let spec = PipelineSpec::new("volume_entries", ["vs", "fs"], &groups, output);
         self.entries.get_or_insert_with(|| spec.create(context, common));
     }
 

@@ -46,3 +46,6 @@ impl tetralod::Coded for GpuError {
         }
     }
 }
+
+/// What the GPU gives.
+pub(super) type Result<T, E = GpuError> = std::result::Result<T, E>;

@@ -2,8 +2,8 @@
 //! `fragments.wgsl`.
 
 use crate::gpu::Context;
-use crate::gpu::pipeline::{Binding, UNUSED, group, group_layout};
-use crate::gpu::target::image_bytes;
+use crate::gpu::pipeline::{Binding, UNUSED, begin_pass, group, group_layout};
+use crate::gpu::target::{image, image_bytes};
 use std::sync::{Arc, Mutex};
 
 /// Room for so many fragments a pixel, on the average, to begin with.
@@ -74,19 +74,9 @@ impl FragmentLists {
         };
         encoder.clear_buffer(&lists.heads, 0, None);
         let lists = self.lists.insert(lists);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("lists of fragments"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &lists.unused,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Discard,
-                },
-            })],
-            ..Default::default()
-        });
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+        let label = "lists of fragments";
+        let mut pass = begin_pass(encoder, label, &lists.unused, clear, wgpu::StoreOp::Discard);
         pass.set_bind_group(2, &lists.group, &[]);
         pass
     }
@@ -173,16 +163,6 @@ impl Lists {
         let heads = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
         let heads = buffer("lists of fragments", 4 * (pixels + 1), heads);
         let nodes = buffer("fragments", 4 * NODE * room.max(1), Usage::STORAGE);
-        let unused = context.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("nothing"),
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: UNUSED,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-            view_formats: &[],
-        });
         let group = group(context, layout, &[heads.as_entire_binding(), nodes.as_entire_binding()]);
         Self {
             size,
@@ -190,7 +170,7 @@ impl Lists {
             heads,
             nodes,
             count: buffer("number of fragments", 4, Usage::COPY_DST | Usage::MAP_READ),
-            unused: unused.create_view(&wgpu::TextureViewDescriptor::default()),
+            unused: image(context, "nothing", size, UNUSED, 1, wgpu::TextureUsages::RENDER_ATTACHMENT),
             group,
         }
     }

@@ -129,6 +129,26 @@ pub(super) enum Output {
     Whole(wgpu::TextureFormat),
 }
 
+/// Begins a pass over a picture without samples and depth.
+pub(super) fn begin_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    label: &str,
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+    store: wgpu::StoreOp,
+) -> wgpu::RenderPass<'a> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load, store },
+        })],
+        ..Default::default()
+    })
+}
+
 /// How one pipeline differs from the others.
 #[derive(Clone, Copy)]
 pub(super) struct PipelineSpec<'a> {
@@ -144,7 +164,17 @@ pub(super) struct PipelineSpec<'a> {
 /// The format of the attachment of passes that write lists alone.
 pub(super) const UNUSED: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 
-impl PipelineSpec<'_> {
+impl<'a> PipelineSpec<'a> {
+    /// A pipeline without buffers of vertices.
+    pub(super) fn new(
+        shader: &'static str,
+        [vertex, fragment]: [&'static str; 2],
+        groups: &'a [Option<&'a wgpu::BindGroupLayout>],
+        output: Output,
+    ) -> Self {
+        Self { shader, vertex, fragment, buffers: &[], groups, output }
+    }
+
     pub(super) fn create(&self, context: &Context, common: &Common) -> wgpu::RenderPipeline {
         let source = SHADERS.iter().find(|(name, _)| *name == self.shader).map_or("", |(_, source)| source);
         let module = context.device.create_shader_module(wgpu::ShaderModuleDescriptor {

@@ -1,7 +1,7 @@
 //! Brings finished pictures to where they are seen: adds each to the mean of those before, and shows the mean.
 
 use crate::gpu::Context;
-use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout};
+use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, begin_pass, group, group_layout};
 use crate::gpu::target::{Images, MEAN};
 
 /// Where a finished picture is shown.
@@ -22,17 +22,8 @@ pub(super) struct Presenter {
 impl Presenter {
     pub(super) fn new(context: &Context, common: &Common) -> Self {
         let layout = group_layout(context, "present", &[Binding::Picture, Binding::Sampler]);
-        let groups = [Some(&layout)];
         let pipeline = |output| {
-            let spec = PipelineSpec {
-                shader: "present",
-                vertex: "vs",
-                fragment: "fs",
-                buffers: &[],
-                groups: &groups,
-                output,
-            };
-            spec.create(context, common)
+            PipelineSpec::new("present", ["vs", "fs"], &[Some(&layout)], output).create(context, common)
         };
         let sampler = context.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("smooth"),
@@ -70,17 +61,7 @@ impl Presenter {
         for (pipeline, from, to, load, part) in steps {
             let resources =
                 [wgpu::BindingResource::TextureView(from), wgpu::BindingResource::Sampler(&self.sampler)];
-            let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("present"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: to,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops,
-                })],
-                ..Default::default()
-            });
+            let mut pass = begin_pass(encoder, "present", to, load, wgpu::StoreOp::Store);
             if let Some([x, y, width, height]) = part {
                 pass.set_scissor_rect(x, y, width, height);
             }

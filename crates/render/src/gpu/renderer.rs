@@ -3,6 +3,7 @@
 use crate::draw::{BoxLines, CellStyle, Look, Style};
 use crate::gpu::cells::CellPass;
 use crate::gpu::composite::Composite;
+use crate::gpu::error::Result;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::mesh::MeshBuffers;
 use crate::gpu::pipeline::{Common, Output, PipelineSpec};
@@ -63,7 +64,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If there is no adapter or it cannot be opened.
-    pub async fn headless(size: [u32; 2]) -> Result<Self, GpuError> {
+    pub async fn headless(size: [u32; 2]) -> Result<Self> {
         let context = Context::headless().await?;
         let target = Target::image(&context, size);
         Self::new(context, target)
@@ -73,10 +74,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If there is no adapter, it cannot be opened, or the canvas cannot be drawn to.
-    pub async fn on_surface(
-        target: impl Into<wgpu::SurfaceTarget<'static>>,
-        size: [u32; 2],
-    ) -> Result<Self, GpuError> {
+    pub async fn on_surface(target: impl Into<wgpu::SurfaceTarget<'static>>, size: [u32; 2]) -> Result<Self> {
         let (context, surface) = Context::with_surface(target).await?;
         let target = Target::canvas(&context, surface, size)?;
         Self::new(context, target)
@@ -87,25 +85,15 @@ impl Renderer {
     ///
     /// # Errors
     /// If the device refuses what the renderer takes.
-    pub fn with_device(
-        context: Context,
-        size: [u32; 2],
-        format: wgpu::TextureFormat,
-    ) -> Result<Self, GpuError> {
+    pub fn with_device(context: Context, size: [u32; 2], format: wgpu::TextureFormat) -> Result<Self> {
         let target = Target::given(&context, size, format);
         Self::new(context, target)
     }
 
-    fn new(context: Context, target: Target) -> Result<Self, GpuError> {
+    fn new(context: Context, target: Target) -> Result<Self> {
         let common = Common::new(&context, target.format);
-        let background = PipelineSpec {
-            shader: "background",
-            vertex: "vs",
-            fragment: "fs",
-            buffers: &[],
-            groups: &[],
-            output: Output::Over(wgpu::CompareFunction::Always),
-        };
+        let over = Output::Over(wgpu::CompareFunction::Always);
+        let background = PipelineSpec::new("background", ["vs", "fs"], &[], over);
         let renderer = Self {
             background: background.create(&context, &common),
             surface_pipelines: SurfacePipelines::new(&context, &common),
@@ -137,7 +125,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the device refuses what it takes.
-    pub fn beside(&mut self) -> Result<&mut Self, GpuError> {
+    pub fn beside(&mut self) -> Result<&mut Self> {
         if self.beside.is_none() {
             let other = Self::with_device(self.context.clone(), self.target.size, self.target.format)?;
             self.beside = Some(Box::new(other));
@@ -227,7 +215,7 @@ impl Renderer {
         key: u32,
         triangles: &Triangles<'_>,
         changes: Option<&SurfaceChanges>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<()> {
         let context = &self.context;
         let surface = self.surfaces.entry(key).or_insert_with(|| {
             let mut surface = Surface::new(context);
@@ -253,7 +241,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the device refuses it.
-    pub fn clear(&mut self) -> Result<(), GpuError> {
+    pub fn clear(&mut self) -> Result<()> {
         self.set_split(0.0);
         self.surfaces.clear();
         self.set_cells(None);
@@ -270,7 +258,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the device refuses it.
-    pub fn set_volume(&mut self, medium: Option<(&Medium, u32)>) -> Result<(), GpuError> {
+    pub fn set_volume(&mut self, medium: Option<(&Medium, u32)>) -> Result<()> {
         let stored = medium.map(|(medium, clips)| (medium.relative_to(&self.points, &self.values), clips));
         self.composite.set_medium(&self.context, stored.as_ref().map(|(medium, clips)| (medium, *clips)))?;
         self.mesh.linked.set_needed(medium.is_some());
@@ -292,7 +280,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If they are too many for the device.
-    pub fn set_cell_values(&mut self, values: &[f64]) -> Result<(), GpuError> {
+    pub fn set_cell_values(&mut self, values: &[f64]) -> Result<()> {
         let (cells, context) = self.cells_mut();
         cells.set_values(context, values)
     }
@@ -319,11 +307,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If it is too large for the device; then none is drawn.
-    pub fn update_mesh(
-        &mut self,
-        mesh: &MeshView<'_>,
-        changes: Option<[&[Range<u32>]; 2]>,
-    ) -> Result<(), GpuError> {
+    pub fn update_mesh(&mut self, mesh: &MeshView<'_>, changes: Option<[&[Range<u32>]; 2]>) -> Result<()> {
         self.composite.set_eye(mesh, &self.values, None);
         let is_same = changes.is_some_and(|[points, tets]| points.is_empty() && tets.is_empty());
         if let Some(cells) =
@@ -343,7 +327,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If they are too many for the device.
-    pub fn set_boxes(&mut self, boxes: &[BoxLines]) -> Result<(), GpuError> {
+    pub fn set_boxes(&mut self, boxes: &[BoxLines]) -> Result<()> {
         self.wire.update(&self.context, boxes, &self.points)
     }
 
@@ -351,7 +335,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If it is lost, or has refused something since the last call.
-    pub fn check(&self) -> Result<(), GpuError> {
+    pub fn check(&self) -> Result<()> {
         self.context.check()
     }
 
@@ -387,7 +371,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the device is lost or refused something, now or since the last picture.
-    pub fn draw(&mut self, camera: &Camera, look: &Look) -> Result<bool, GpuError> {
+    pub fn draw(&mut self, camera: &Camera, look: &Look) -> Result<bool> {
         self.draw_on(camera, look, 0, None)
     }
 
@@ -397,7 +381,7 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::draw`].
-    pub fn draw_again(&mut self) -> Result<bool, GpuError> {
+    pub fn draw_again(&mut self) -> Result<bool> {
         match self.last.take() {
             Some((camera, look, count)) => self.draw_on(&camera, &look, count, None),
             None => Ok(false),
@@ -414,7 +398,7 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::draw`].
-    pub fn render(&mut self, view: &wgpu::TextureView, camera: &Camera, look: &Look) -> Result<(), GpuError> {
+    pub fn render(&mut self, view: &wgpu::TextureView, camera: &Camera, look: &Look) -> Result<()> {
         self.draw_on(camera, look, 0, Some(view)).map(|_| ())
     }
 
@@ -423,7 +407,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the device is lost.
-    pub fn in_flight(&self) -> Result<u32, GpuError> {
+    pub fn in_flight(&self) -> Result<u32> {
         // Native devices call back from here, browsers on their own.
         let polled = self.context.device.poll(wgpu::PollType::Poll);
         polled.map_err(|error| GpuError::Refused(error.to_string()))?;
@@ -444,7 +428,7 @@ impl Renderer {
         look: &Look,
         count: u32,
         given: Option<&wgpu::TextureView>,
-    ) -> Result<bool, GpuError> {
+    ) -> Result<bool> {
         self.context.check()?;
         let picture = match given {
             Some(_) => None,
@@ -614,7 +598,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the target is no image, or the device is lost or refused something.
-    pub async fn picture(&mut self, camera: &Camera, look: &Look, samples: u32) -> Result<Vec<u8>, GpuError> {
+    pub async fn picture(&mut self, camera: &Camera, look: &Look, samples: u32) -> Result<Vec<u8>> {
         self.picture_with(camera, look, samples, |_| {}).await
     }
 
@@ -628,7 +612,7 @@ impl Renderer {
         look: &Look,
         samples: u32,
         mut drawn: impl FnMut(u32),
-    ) -> Result<Vec<u8>, GpuError> {
+    ) -> Result<Vec<u8>> {
         // Reading waits until everything before is done: fragments are counted then, and devices never have
         // more than a picture to do.
         let mut pixels = loop {
@@ -651,7 +635,7 @@ impl Renderer {
     ///
     /// # Errors
     /// If the target is no image, or the device is lost.
-    pub async fn read(&self) -> Result<Vec<u8>, GpuError> {
+    pub async fn read(&self) -> Result<Vec<u8>> {
         self.target.read(&self.context).await
     }
 }

@@ -1,7 +1,7 @@
 //! Shade in hollows: takes light away from what is opaque, by what is near it on the screen. See `shade.wgsl`.
 
 use crate::gpu::Context;
-use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
+use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, begin_pass, group, group_layout, uniform};
 use crate::gpu::target::{image, image_bytes};
 
 /// Of the shade of each pixel, and the depth that it is for.
@@ -34,16 +34,7 @@ impl ShadePass {
             group_layout(context, "shade that was found", &[Uniform, Depths, Numbers]),
         ];
         let pipeline = |layout: &wgpu::BindGroupLayout, fragment, output| {
-            let groups = [Some(layout)];
-            let spec = PipelineSpec {
-                shader: "shade",
-                vertex: "vs",
-                fragment,
-                buffers: &[],
-                groups: &groups,
-                output,
-            };
-            spec.create(context, common)
+            PipelineSpec::new("shade", ["vs", fragment], &[Some(layout)], output).create(context, common)
         };
         let over = Output::Over(wgpu::CompareFunction::Always);
         Self {
@@ -78,19 +69,8 @@ impl ShadePass {
             None => image(context, "shade", size, FOUND, 1, usage),
         };
         let found = self.found.insert(found);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("shade"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: found,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            ..Default::default()
-        });
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+        let mut pass = begin_pass(encoder, "shade", found, clear, wgpu::StoreOp::Store);
         let resources = [self.uniform.as_entire_binding(), wgpu::BindingResource::TextureView(depth)];
         pass.set_pipeline(&self.find);
         pass.set_bind_group(0, &common.group, &[]);

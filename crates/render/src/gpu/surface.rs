@@ -34,9 +34,8 @@ impl SurfacePipelines {
     pub(super) fn new(context: &Context, common: &Common) -> Self {
         use Binding::{Uniform, Vertices};
         let layout = group_layout(context, "surface", &[Uniform, Vertices, Vertices, Vertices, Vertices]);
-        let spec = spec("fs", &[], Output::Opaque { only_front: false });
-        let groups = [Some(&layout)];
-        let opaque = PipelineSpec { groups: &groups, ..spec }.create(context, common);
+        let (groups, output) = ([Some(&layout)], Output::Opaque { only_front: false });
+        let opaque = PipelineSpec::new("surface", ["vs", "fs"], &groups, output).create(context, common);
         Self { opaque, listed: None, layout }
     }
 
@@ -48,7 +47,8 @@ impl SurfacePipelines {
         lists: &wgpu::BindGroupLayout,
     ) {
         let groups = [Some(&self.layout), Some(lists)];
-        let spec = spec("fs_list", &groups, Output::List { only_front: false });
+        let output = Output::List { only_front: false };
+        let spec = PipelineSpec::new("surface", ["vs", "fs_list"], &groups, output);
         self.listed.get_or_insert_with(|| spec.create(context, common));
     }
 
@@ -68,14 +68,6 @@ impl SurfacePipelines {
             }
         }
     }
-}
-
-fn spec<'a>(
-    fragment: &'static str,
-    groups: &'a [Option<&'a wgpu::BindGroupLayout>],
-    output: Output,
-) -> PipelineSpec<'a> {
-    PipelineSpec { shader: "surface", vertex: "vs", fragment, buffers: &[], groups, output }
 }
 
 impl Surface {

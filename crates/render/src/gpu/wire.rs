@@ -33,9 +33,8 @@ impl WirePass {
     pub(super) fn new(context: &Context, common: &Common) -> Self {
         let pipeline = |vertex, fragment, depth| {
             let output = Output::Over(depth);
-            let spec =
-                PipelineSpec { shader: "wire", vertex, fragment, buffers: &BUFFERS, groups: &[], output };
-            spec.create(context, common)
+            let spec = PipelineSpec::new("wire", [vertex, fragment], &[], output);
+            PipelineSpec { buffers: &BUFFERS, ..spec }.create(context, common)
         };
         Self {
             hidden: pipeline("vs_line", "fs_hidden", wgpu::CompareFunction::Greater),
@@ -58,15 +57,10 @@ impl WirePass {
             return;
         }
         let nothing = group_layout(context, "nothing", &[]);
-        let spec = PipelineSpec {
-            shader: "wire",
-            vertex: "vs_line",
-            fragment: "fs_list",
-            buffers: &BUFFERS,
-            groups: &[Some(&nothing), Some(lists)],
-            output: Output::List { only_front: false },
-        };
-        self.listed = Some((spec.create(context, common), group(context, &nothing, &[])));
+        let (groups, output) = ([Some(&nothing), Some(lists)], Output::List { only_front: false });
+        let spec = PipelineSpec::new("wire", ["vs_line", "fs_list"], &groups, output);
+        let pipeline = PipelineSpec { buffers: &BUFFERS, ..spec }.create(context, common);
+        self.listed = Some((pipeline, group(context, &nothing, &[])));
     }
 
     pub(super) fn update(

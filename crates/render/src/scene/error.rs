@@ -39,3 +39,6 @@ impl Coded for SceneError {
         }
     }
 }
+
+/// What is found for a scene.
+pub(super) type Result<T, E = SceneError> = std::result::Result<T, E>;

@@ -1,5 +1,6 @@
 //! What the objects of a scene are computed from: a session's mesh as it is now, or one that was kept.
 
+use super::error::Result;
 use super::state::ColourState;
 use super::styles::{quantity, scale};
 use super::{SceneError, SceneState};
@@ -21,12 +22,7 @@ pub(super) struct Current {
 
 impl Current {
     /// Brings it up to date but for the difference; whether there is anything new.
-    pub fn take(
-        &mut self,
-        session: &mut Session,
-        state: &SceneState,
-        is_stale: bool,
-    ) -> Result<bool, SceneError> {
+    pub fn take(&mut self, session: &mut Session, state: &SceneState, is_stale: bool) -> Result<bool> {
         self.changes = session.take_changes();
         let is_new = is_stale || !self.changes.vertices.is_empty() || !self.changes.tets.is_empty();
         if let (true, Some(quantity)) = (is_new, state.cells.as_ref().map_or(Ok(None), quantity)?) {
@@ -92,7 +88,7 @@ pub(super) struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// The number of the field with a name, of the time step that is shown if it has that; that of the mesh without one.
-    pub fn field(&self, what: &str, name: Option<&String>) -> Result<usize, SceneError> {
+    pub fn field(&self, what: &str, name: Option<&String>) -> Result<usize> {
         let Some(name) = name else { return Ok(self.shown) };
         let time = self.info.fields[self.shown].time;
         let all = || self.info.fields.iter().enumerate().filter(|(_, field)| field.name == *name);
@@ -105,7 +101,7 @@ impl<'a> Input<'a> {
     }
 
     /// The colours of a field; the range of the state is for the field that is shown.
-    pub fn scale(&self, field: usize) -> Result<ColourScale, SceneError> {
+    pub fn scale(&self, field: usize) -> Result<ColourScale> {
         if let Some(largest) = self.largest_difference.filter(|_| field == self.shown) {
             let most = if largest > 0.0 { largest } else { 1.0 };
             return scale(&ColourState { log: false, ..self.state.colours.clone() }, None, [-most, most]);
@@ -137,7 +133,7 @@ impl<'a> Input<'a> {
         if is_difference { self.mesh.field.into() } else { (self.fields)(field) }
     }
 
-    pub fn vectors(&self, what: &str, names: &[String; 3]) -> Result<[Cow<'a, [f64]>; 3], SceneError> {
+    pub fn vectors(&self, what: &str, names: &[String; 3]) -> Result<[Cow<'a, [f64]>; 3]> {
         let mut found = [0; 3];
         for (place, name) in found.iter_mut().zip(names) {
             *place = self.field(what, Some(name))?;

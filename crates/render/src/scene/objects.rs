@@ -1,9 +1,10 @@
 //! What is computed from a mesh for a scene: surfaces, sections, tubes.
 
+use super::error::Result;
 use super::input::Input;
 use super::state::{ArrowState, IsosurfaceState, StreamlineState};
 use super::styles::{cell_style, clips, isosurface_style, medium, other_clips, quantity, range, scale};
-use super::{Legend, SceneError, SliceState};
+use super::{Legend, SliceState};
 use crate::draw::{Colouring, EdgeLook, Edit, Lighting, Style};
 use tetralod::geom::SingleValues;
 use tetralod::mt::MeshChanges;
@@ -72,7 +73,7 @@ impl Objects {
         input: &Input<'a>,
         is_stale: bool,
         edits: &mut Edits<'a>,
-    ) -> Result<(), SceneError> {
+    ) -> Result<()> {
         let Self { isosurfaces, slices, caps, boundary, tubes, arrows, legend, single } = self;
         let stored = input.single(input.shown);
         let is_stored_anew = std::mem::replace(single, stored) != stored;
@@ -94,11 +95,7 @@ impl Objects {
     }
 }
 
-fn list_cells<'a>(
-    input: &Input<'a>,
-    legend: &mut Option<Legend>,
-    edits: &mut Edits<'a>,
-) -> Result<(), SceneError> {
+fn list_cells<'a>(input: &Input<'a>, legend: &mut Option<Legend>, edits: &mut Edits<'a>) -> Result<()> {
     let Some(cells) = &input.state.cells else {
         edits.push(Edit::Cells(None));
         return Ok(());
@@ -116,7 +113,7 @@ fn list_cells<'a>(
     Ok(())
 }
 
-fn volume<'a>(input: &Input<'a>) -> Result<Edit<'a>, SceneError> {
+fn volume<'a>(input: &Input<'a>) -> Result<Edit<'a>> {
     let Some(volume) = &input.state.volume else { return Ok(Edit::Volume(None)) };
     let medium = medium(volume, &input.scale(input.shown)?, input.diagonal());
     Ok(Edit::Volume(Some((medium, if volume.clipped { u32::MAX } else { 0 }))))
@@ -132,7 +129,7 @@ fn list_isosurfaces<'a>(
     own: &'a mut Vec<Isosurface>,
     input: &Input<'a>,
     edits: &mut Edits<'a>,
-) -> Result<(), SceneError> {
+) -> Result<()> {
     let states = &input.state.isosurfaces;
     resize(own, states.len(), ISOSURFACES, edits);
     for (key, (own, state)) in (ISOSURFACES..).zip(own.iter_mut().zip(states)) {
@@ -142,12 +139,7 @@ fn list_isosurfaces<'a>(
 }
 
 impl Isosurface {
-    fn update<'a>(
-        &'a mut self,
-        input: &Input<'a>,
-        key: u32,
-        state: &IsosurfaceState,
-    ) -> Result<Edit<'a>, SceneError> {
+    fn update<'a>(&'a mut self, input: &Input<'a>, key: u32, state: &IsosurfaceState) -> Result<Edit<'a>> {
         let was_whole = std::mem::replace(&mut self.is_whole, false);
         let mesh = MeshView { field: input.field, ..input.mesh };
         let [low, high] = input.info.range_at_all_times(input.shown);
@@ -178,7 +170,7 @@ fn list_sections<'a>(
     input: &Input<'a>,
     states: &[SliceState],
     edits: &mut Edits<'a>,
-) -> Result<(), SceneError> {
+) -> Result<()> {
     resize(own, states.len(), first, edits);
     for (key, (own, state)) in (first..).zip(own.iter_mut().zip(states)) {
         edits.push(own.update(input, key, state)?);
@@ -187,12 +179,7 @@ fn list_sections<'a>(
 }
 
 impl Section {
-    fn update<'a>(
-        &'a mut self,
-        input: &Input<'a>,
-        key: u32,
-        state: &SliceState,
-    ) -> Result<Edit<'a>, SceneError> {
+    fn update<'a>(&'a mut self, input: &Input<'a>, key: u32, state: &SliceState) -> Result<Edit<'a>> {
         let field = input.field("slices", state.field.as_ref())?;
         let plane = state.plane();
         self.slice.extract(&input.mesh, &plane.plane());
@@ -222,7 +209,7 @@ fn list_boundary<'a>(
     caps: &'a mut Vec<Section>,
     input: &Input<'a>,
     edits: &mut Edits<'a>,
-) -> Result<(), SceneError> {
+) -> Result<()> {
     let Some(boundary) = &input.state.boundary else {
         edits.push(Edit::Remove(BOUNDARY));
         resize(caps, 0, CAPS, edits);
@@ -252,11 +239,7 @@ fn list_boundary<'a>(
     list_sections(caps, CAPS, input, &cutting.into_iter().map(cap).collect::<Vec<_>>(), edits)
 }
 
-fn streamlines<'a>(
-    own: &'a mut Solids,
-    input: &Input<'a>,
-    legend: &mut Option<Legend>,
-) -> Result<Edit<'a>, SceneError> {
+fn streamlines<'a>(own: &'a mut Solids, input: &Input<'a>, legend: &mut Option<Legend>) -> Result<Edit<'a>> {
     let Some(StreamlineState { fields, seeds, radius, field }) = &input.state.streamlines else {
         return Ok(Edit::Remove(TUBES));
     };
@@ -284,11 +267,7 @@ fn streamlines<'a>(
     solids(own, input, TUBES, values, ("speed", input.lengths(fields)), legend)
 }
 
-fn arrow_list<'a>(
-    own: &'a mut Solids,
-    input: &Input<'a>,
-    legend: &mut Option<Legend>,
-) -> Result<Edit<'a>, SceneError> {
+fn arrow_list<'a>(own: &'a mut Solids, input: &Input<'a>, legend: &mut Option<Legend>) -> Result<Edit<'a>> {
     let Some(ArrowState { fields, spacing, field, constant }) = &input.state.arrows else {
         return Ok(Edit::Remove(ARROWS));
     };
@@ -312,7 +291,7 @@ fn solids<'a>(
     field: Option<usize>,
     (own, lengths): (&str, [f64; 2]),
     legend: &mut Option<Legend>,
-) -> Result<Edit<'a>, SceneError> {
+) -> Result<Edit<'a>> {
     let single = field.map_or_else(|| SingleValues::of_values(&solids.values), |field| input.single(field));
     let triangles = Triangles { single, ..Triangles::from(solids) };
     let scale = match field {
@@ -327,7 +306,7 @@ fn solids<'a>(
 }
 
 /// The legend of the field, unless tetrahedra have one of their own.
-fn update_legend(shown: &mut Option<Legend>, input: &Input<'_>) -> Result<(), SceneError> {
+fn update_legend(shown: &mut Option<Legend>, input: &Input<'_>) -> Result<()> {
     let state = input.state;
     if state.cells.as_ref().is_some_and(|cells| quantity(cells).is_ok_and(|found| found.is_some())) {
         return Ok(());

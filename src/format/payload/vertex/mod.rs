@@ -11,17 +11,19 @@ mod state;
 #[cfg(test)]
 pub(super) mod tests;
 
-use super::codec::{Codec, Head, InOrder, Parts, Started, put_in_order, sections_in_order};
+use super::codec::{Codec, Head, InOrder, Parts, Started};
 use super::families::{OWN_FALL, QUARTERINGS};
-use crate::format::coder::{Family, Models, Put, Source};
+use crate::format::coder::{Family, Put, Source};
+use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
-use crate::format::section::Section;
-use crate::format::{EncodeError, FormatError, Limits};
+use crate::format::{FormatError, Limits};
 use crate::mt::{
     Applied, ApplyUpdates, BaseMesh, BaseMeshError, ErrorCode, Insertion, Mt, MtInfo, MtKind,
     MultiTessellation, UpdateError, UpdateId, VertexMt,
 };
+use std::ops::Range;
+
 use families::{ERROR, FAN, GIVEN_UP, GROW, PARTS, SEED};
 use numbers::{put_levels, put_one_of, put_position, read_levels, read_one_of, read_position};
 use state::{State, grain};
@@ -32,24 +34,6 @@ const ELSEWHERE: u32 = 8;
 /// After so many updates their memory is looked at.
 const MEASURED: u32 = 16;
 
-/// Bytes that every update takes in memory: a vertex, its own loop, the size of what it removes.
-fn least_update_bytes(info: &MtInfo) -> u64 {
-    let levels: u64 = info.fields.iter().map(|field| u64::from(field.bits)).sum();
-    (3 * u64::from(info.lattice.bits) + levels + 9) / 8 + 4
-}
-
-/// An insertion adds one vertex.
-fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
-    let vertices = base_vertices + u64::from(info.updates);
-    if vertices != u64::from(info.vertices) {
-        return Err(BaseMeshError::Info("base vertices and updates do not add up to the reference vertices"));
-    }
-    if vertices >= u64::from(u32::MAX) {
-        return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
-    }
-    Ok(())
-}
-
 impl Codec for VertexMt {
     const KIND: MtKind = MtKind::Vertex;
     const NUMBER: u8 = 1;
@@ -57,16 +41,30 @@ impl Codec for VertexMt {
     const PARTS: Parts = PARTS;
     const HAS_TET_ERRORS: bool = true;
 
+    /// An insertion adds one vertex.
     fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
-        check_counts(info, base_vertices)
+        let vertices = base_vertices + u64::from(info.updates);
+        if vertices != u64::from(info.vertices) {
+            return Err(BaseMeshError::Info(
+                "base vertices and updates do not add up to the reference vertices",
+            ));
+        }
+        if vertices >= u64::from(u32::MAX) {
+            return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
+        }
+        Ok(())
     }
 
+    /// A vertex, its own loop, the size of what it removes.
     fn least_update_bytes(info: &MtInfo) -> u64 {
-        least_update_bytes(info)
+        let levels: u64 = info.fields.iter().map(|field| u64::from(field.bits)).sum();
+        (3 * u64::from(info.lattice.bits) + levels + 9) / 8 + 4
     }
 
+    /// Puts what all insertions have in common: whether each makes the mesh larger, and the granularity of the coordinates.
     fn put_head(&self, out: &mut impl Put) {
-        put_head(out, self);
+        out.bits(u32::from(self.always_grows()), 1);
+        grain(self).iter().for_each(|&x| out.bits(x as u32, 31));
     }
 
     fn read_head(
@@ -75,18 +73,44 @@ impl Codec for VertexMt {
         _: [u32; 2],
         _: u32,
         _: &Limits,
-    ) -> Result<Box<dyn Head>, FormatError> {
-        Ok(Box::new(read_head(source)?))
+    ) -> Result<Box<dyn Head>> {
+        Ok(Box::new(InsertionRules::read(source)?))
     }
 
-    fn put_updates(&self, out: &mut impl Put) -> Result<(), EncodeError> {
-        let mut state = State::of(self).map_err(EncodeError::Base)?;
-        put_in_order(out, self, |out, updates| put(out, self, updates.start, updates.end, &mut state))
+    type Writing = State;
+
+    fn writing(&self) -> Result<State, BaseMeshError> {
+        State::of(self)
     }
 
-    fn sections(&self, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
-        let mut state = State::of(self).map_err(EncodeError::Base)?;
-        sections_in_order(self, models, |out, updates| put(out, self, updates.start, updates.end, &mut state))
+    fn put_block(
+        &self,
+        out: &mut impl Put,
+        mut updates: Range<u32>,
+        state: &mut State,
+    ) -> Result<(), UpdateError> {
+        updates.try_for_each(|u| put_update(out, self, UpdateId(u), state))
+    }
+}
+
+/// What all insertions of an MT have in common.
+#[derive(Clone, Copy, Debug, Default)]
+struct InsertionRules {
+    always_grows: bool,
+    grain: [i32; 3],
+}
+
+impl InsertionRules {
+    fn read(source: &mut Source<'_>) -> Result<Self> {
+        let always_grows = source.bits(1)? == 1;
+        let mut grain = [0; 3];
+        for x in &mut grain {
+            *x = source.bits(31)? as i32;
+        }
+        if grain.iter().any(|&x| x < 1) {
+            return Err(source.corrupt("the granularity of coordinates must be at least 1"));
+        }
+        Ok(Self { always_grows, grain })
     }
 }
 
@@ -97,85 +121,35 @@ impl Head for InsertionRules {
         base: BaseMesh,
         block_bits: u32,
         tet_errors: bool,
-    ) -> Result<Started, FormatError> {
-        let (mut mt, state) = start(info, base, *self, tet_errors)?;
+    ) -> Result<Started> {
+        let mut mt = VertexMt::growing(info, base, self.always_grows, tet_errors)?;
+        let state = State::new(&mt, self.grain)?;
         mt.set_page_bits(block_bits);
         Ok((mt.into(), Some(Box::new(state))))
     }
 }
 
 impl InOrder for State {
-    fn read(
-        &mut self,
-        source: &mut Source<'_>,
-        mt: &mut Mt,
-        count: u32,
-        limits: &Limits,
-    ) -> Result<(), FormatError> {
+    fn read(&mut self, source: &mut Source<'_>, mt: &mut Mt, count: u32, limits: &Limits) -> Result<()> {
         match mt {
-            Mt::Vertex(mt) => read(source, mt, count, self, limits),
+            Mt::Vertex(mt) => (1..=count).try_for_each(|k| {
+                read_update(source, mt, self)?;
+                let is_measured = k.is_multiple_of(MEASURED) || k == count;
+                if is_measured { check_bytes(mt.bytes() + self.mesh.bytes(), limits) } else { Ok(()) }
+            }),
             _ => Err(source.corrupt("a section is out of place")),
         }
     }
 }
 
-/// Puts what all insertions have in common: whether each makes the mesh larger, and the granularity of the coordinates.
-fn put_head(out: &mut impl Put, mt: &VertexMt) {
-    out.bits(u32::from(mt.always_grows()), 1);
-    grain(mt).iter().for_each(|&x| out.bits(x as u32, 31));
-}
-
-/// What all insertions of an MT have in common.
-#[derive(Clone, Copy, Debug, Default)]
-struct InsertionRules {
-    always_grows: bool,
-    grain: [i32; 3],
-}
-
-/// Reads that.
-fn read_head(source: &mut Source<'_>) -> Result<InsertionRules, FormatError> {
-    let always_grows = source.bits(1)? == 1;
-    let mut grain = [0; 3];
-    for x in &mut grain {
-        *x = source.bits(31)? as i32;
-    }
-    if grain.iter().any(|&x| x < 1) {
-        return Err(source.corrupt("the granularity of coordinates must be at least 1"));
-    }
-    Ok(InsertionRules { always_grows, grain })
-}
-
-/// An MT without updates, and what to read its updates with.
-fn start(
-    info: MtInfo,
-    base: BaseMesh,
-    rules: InsertionRules,
-    tet_errors: bool,
-) -> Result<(VertexMt, State), FormatError> {
-    let mt = VertexMt::growing(info, base, rules.always_grows, tet_errors)?;
-    let state = State::new(&mt, rules.grain)?;
-    Ok((mt, state))
-}
-
-/// Puts the updates `first .. end`, which follow those that were put with this state before.
+/// Puts the next update.
 ///
 /// # Errors
-/// If the MT is damaged, or an update removes what does not hang together.
-fn put(
-    out: &mut impl Put,
-    mt: &VertexMt,
-    first: u32,
-    end: u32,
-    state: &mut State,
-) -> Result<(), UpdateError> {
-    (first..end).try_for_each(|u| put_update(out, mt, UpdateId(u), state))
-}
-
+/// If the MT is damaged, or the update removes what does not hang together.
 fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State) -> Result<(), UpdateError> {
     let torn = UpdateError::Cavity { update: u.0 };
     put_errors(out, ERROR, &mut state.errors, mt.errors(u));
-    let mut removed = Vec::new();
-    mt.find_removed(&mut state.mesh, u, &mut removed)?;
+    let removed = mt.find_removed(&mut state.mesh, u)?;
     let position = mt.position(u);
     let (near, fan) = state.near(&removed, position).ok_or(torn.clone())?;
     out.symbol(FAN, 0, u32::from(fan));
@@ -221,24 +195,7 @@ fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State)
     Ok(())
 }
 
-/// Reads `count` updates into the MT.
-fn read(
-    source: &mut Source<'_>,
-    mt: &mut VertexMt,
-    count: u32,
-    state: &mut State,
-    limits: &Limits,
-) -> Result<(), FormatError> {
-    for k in 1..=count {
-        read_update(source, mt, state)?;
-        if k.is_multiple_of(MEASURED) || k == count {
-            check_bytes(mt.bytes() + state.mesh.bytes(), limits)?;
-        }
-    }
-    Ok(())
-}
-
-fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) -> Result<(), FormatError> {
+fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) -> Result<()> {
     read_errors(source, ERROR, &mut state.errors)?;
     let fan = source.symbol(FAN, 0)? == 1;
     let near = read_one_of(source, state.mesh.positions().len() as u32)?;
@@ -286,7 +243,7 @@ fn put_errors(out: &mut impl Put, family: Family, before: &mut [ErrorCode], erro
 }
 
 /// Turns the errors of the update before into those of the next one.
-fn read_errors(source: &mut Source<'_>, family: Family, errors: &mut [ErrorCode]) -> Result<(), FormatError> {
+fn read_errors(source: &mut Source<'_>, family: Family, errors: &mut [ErrorCode]) -> Result<()> {
     for error in errors {
         let fall = u16::try_from(source.number(family, 0)?);
         let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
@@ -310,7 +267,7 @@ fn read_quarterings(
     source: &mut Source<'_>,
     quarterings: &mut Vec<u8>,
     are_home: impl Iterator<Item = bool>,
-) -> Result<u8, FormatError> {
+) -> Result<u8> {
     let own_fall = source.symbol(OWN_FALL, 0)? as u8;
     quarterings.clear();
     for is_home in are_home {

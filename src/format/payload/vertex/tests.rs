@@ -84,19 +84,19 @@ struct Coded {
 
 fn coded(mt: &VertexMt, size: u32) -> Result<Coded, FormatError> {
     let mut counts = Counts::default();
-    put_head(&mut counts, mt);
+    mt.put_head(&mut counts);
     let mut state = State::of(mt)?;
-    put(&mut counts, mt, 0, mt.updates(), &mut state)?;
+    mt.put_block(&mut counts, 0..mt.updates(), &mut state)?;
     let models = Models::new(&counts);
     let mut writer = Writer::new(&models);
-    put_head(&mut writer, mt);
+    mt.put_head(&mut writer);
     let mut head = Vec::new();
     writer.finish(&mut head);
     let mut state = State::of(mt)?;
     let mut blocks = Vec::new();
     for first in (0..mt.updates()).step_by(size as usize) {
         let mut writer = Writer::new(&models);
-        put(&mut writer, mt, first, mt.updates().min(first + size), &mut state)?;
+        mt.put_block(&mut writer, first..mt.updates().min(first + size), &mut state)?;
         let mut block = Vec::new();
         writer.finish(&mut block);
         blocks.push(block);
@@ -108,10 +108,21 @@ impl Coded {
     /// An MT into which no block has come.
     fn start(&self, info: &MtInfo, base: &BaseMesh) -> Result<(VertexMt, State), FormatError> {
         let mut source = Source::new(Reader::new(&self.head, 0), &self.models)?;
-        let known = read_head(&mut source)?;
+        let InsertionRules { always_grows, grain } = InsertionRules::read(&mut source)?;
         source.end()?;
-        start(info.clone(), base.clone(), known, false)
+        let mt = VertexMt::growing(info.clone(), base.clone(), always_grows, false)?;
+        let state = State::new(&mt, grain)?;
+        Ok((mt, state))
     }
+}
+
+fn read(
+    source: &mut Source<'_>,
+    mt: &mut VertexMt,
+    count: u32,
+    state: &mut State,
+) -> Result<(), FormatError> {
+    (0..count).try_for_each(|_| read_update(source, mt, state))
 }
 
 fn decoded(coded: &Coded, info: &MtInfo, base: &BaseMesh, size: u32) -> Result<VertexMt, FormatError> {
@@ -119,7 +130,7 @@ fn decoded(coded: &Coded, info: &MtInfo, base: &BaseMesh, size: u32) -> Result<V
     for block in &coded.blocks {
         let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
         let count = size.min(info.updates - mt.updates());
-        read(&mut source, &mut mt, count, &mut state, &Limits::default())?;
+        read(&mut source, &mut mt, count, &mut state)?;
         source.end()?;
     }
     Ok(mt)
@@ -149,7 +160,7 @@ fn what_has_come_is_an_mt() -> Result<(), FormatError> {
     for block in &coded.blocks {
         let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
         let known = mt.updates();
-        read(&mut source, &mut mt, 10, &mut state, &Limits::default())?;
+        read(&mut source, &mut mt, 10, &mut state)?;
         mt.updates_arrived(&mut mesh, known);
         let mut other = mt.start()?;
         for u in (0..mt.updates()).map(UpdateId) {
@@ -196,7 +207,7 @@ fn updates_that_come_one_by_one_are_revealed_wherever_they_lie() -> Result<(), F
     let mut applied = Vec::new();
     for (u, block) in (0..).zip(&coded.blocks) {
         let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
-        read(&mut source, &mut mt, 1, &mut state, &Limits::default())?;
+        read(&mut source, &mut mt, 1, &mut state)?;
         mesh.clear_touched();
         mt.updates_arrived(&mut mesh, u);
         let is_news = |&t: &u32| mt.remover(&mesh, t) == Some(UpdateId(u));

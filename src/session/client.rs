@@ -1,36 +1,15 @@
 //! A session over a file that is elsewhere, for native programs: fetches what a request needs, and nothing else.
 //!
-//! [`Remote`] says what it wants, a [`RangeSource`] brings it; [`Client`] is the loop between the two. Pages have theirs in
+//! [`Session`] says what it wants, a [`RangeSource`] brings it; [`Client`] is the loop between the two. Pages have theirs in
 //! JavaScript.
 
-use crate::format::{DecodeOptions, FormatError, Limits};
+use super::{Session, SessionError};
+use crate::format::{DecodeOptions, FormatError};
 use crate::refine::{GoOn, RefineStats, Request};
-use crate::remote::Remote;
-use crate::session::{Session, SessionError};
 use crate::stream::{RangeSource, StreamError, WantedRange};
+use std::ops::Range;
 use std::time::Duration;
 use thiserror::Error;
-
-#[doc(hidden)]
-pub use crate::remote::Step;
-
-/// How a client works.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ClientOptions {
-    /// The fields that are wanted, by name; all if none is named.
-    pub fields: Vec<String>,
-    /// Bytes that blocks of updates may take in memory. What a request needs beyond that is left out.
-    pub memory: u64,
-    /// What the file may take besides.
-    pub limits: Limits,
-}
-
-impl Default for ClientOptions {
-    /// All fields, and all of the file if need be.
-    fn default() -> Self {
-        Self { fields: Vec::new(), memory: u64::MAX, limits: Limits::default() }
-    }
-}
 
 /// Why a client cannot do what it was asked for. The current mesh is valid all the same.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -57,21 +36,22 @@ const STEP_BYTES: u64 = 1 << 18;
 #[derive(Debug)]
 pub struct Client<S> {
     source: S,
-    remote: Remote,
+    session: Session,
+    /// What has been asked for and has not come.
+    asked: Vec<Range<u64>>,
 }
 
 impl<S: RangeSource> Client<S> {
-    /// Opens the file of `source`: returns when the base mesh is there.
+    /// Opens the file of `source`, whose blocks may take so many bytes in memory: returns when the base mesh is there. What a
+    /// request needs beyond that is left out.
     ///
     /// # Errors
     /// If the bytes do not come, or are not those of an MT file.
-    pub fn open(source: S, options: ClientOptions) -> Result<Self, ClientError> {
-        let ClientOptions { fields, memory, limits } = options;
-        let decode = DecodeOptions { limits, fields, ..DecodeOptions::default() };
-        let mut client = Self { source, remote: Remote::in_parts(decode, memory) };
-        while client.session().mesh().is_none() && !client.fetch(PATIENCE)? {}
-        if client.session().mesh().is_none() {
-            client.session_mut().finish()?;
+    pub fn open(source: S, options: DecodeOptions, memory: u64) -> Result<Self, ClientError> {
+        let mut client = Self { source, session: Session::in_parts(options, memory), asked: Vec::new() };
+        while client.session.mesh().is_none() && !client.fetch(PATIENCE)? {}
+        if client.session.mesh().is_none() {
+            client.session.finish()?;
         }
         Ok(client)
     }
@@ -86,9 +66,9 @@ impl<S: RangeSource> Client<S> {
         let mut before = RefineStats::default();
         loop {
             while !self.fetch(PATIENCE)? {}
-            let Step { mut stats, complete } = self.step(Duration::ZERO, &mut |_| true)?;
+            let mut stats = self.step(Duration::ZERO, &mut |_| true)?;
             stats.add_work(&before);
-            if complete {
+            if self.is_complete(&stats) {
                 return Ok(stats);
             }
             before = stats;
@@ -100,7 +80,7 @@ impl<S: RangeSource> Client<S> {
     /// # Errors
     /// If the request makes no sense for this MT; the request before it then remains.
     pub fn request(&mut self, request: &Request) -> Result<(), ClientError> {
-        self.remote.request(request, &[])?;
+        self.session.request(request)?;
         // What is on its way may not be wanted any more.
         self.ask();
         Ok(())
@@ -111,17 +91,22 @@ impl<S: RangeSource> Client<S> {
     ///
     /// # Errors
     /// As [`Client::refine`].
-    pub fn step(&mut self, patience: Duration, go_on: GoOn<'_>) -> Result<Step, ClientError> {
-        let end = self.fetched().saturating_add(STEP_BYTES);
+    pub fn step(&mut self, patience: Duration, go_on: GoOn<'_>) -> Result<RefineStats, ClientError> {
+        let end = self.session.fetched().saturating_add(STEP_BYTES);
         let mut all_here = self.fetch(patience)?;
-        while !all_here && self.fetched() < end {
-            let before = self.fetched();
+        while !all_here && self.session.fetched() < end {
+            let before = self.session.fetched();
             all_here = self.fetch(Duration::ZERO)?;
-            if self.fetched() == before {
+            if self.session.fetched() == before {
                 break;
             }
         }
-        Ok(self.remote.step(go_on)?)
+        Ok(self.session.step(go_on)?)
+    }
+
+    /// Whether nothing more is to come after a step: the mesh is as the request wants it, as far as there is memory.
+    pub fn is_complete(&self, stats: &RefineStats) -> bool {
+        stats.done && !self.session.is_waiting()
     }
 
     /// Waits up to `patience` for more of what is wanted, and takes it in; returns whether all of it is here.
@@ -129,14 +114,14 @@ impl<S: RangeSource> Client<S> {
     /// # Errors
     /// If the bytes do not come or are damaged.
     pub fn fetch(&mut self, patience: Duration) -> Result<bool, ClientError> {
-        if !self.remote.is_asking() && !self.ask() {
+        if self.asked.is_empty() && !self.ask() {
             return Ok(true);
         }
         let Some((range, bytes)) = self.source.next(patience)? else {
             return Ok(false);
         };
-        self.remote.take(&range, &bytes)?;
-        Ok(!self.remote.is_asking() && !self.ask())
+        self.take(&range, &bytes)?;
+        Ok(self.asked.is_empty() && !self.ask())
     }
 
     /// Fetches the exact values that the file keeps, if it does and they are not here: see [`Session::exact_values`]. They take as
@@ -145,56 +130,42 @@ impl<S: RangeSource> Client<S> {
     /// # Errors
     /// If the bytes do not come or are damaged.
     pub fn fetch_exact(&mut self) -> Result<(), ClientError> {
-        let Some(range) = self.session().exact_range() else { return Ok(()) };
+        let Some(range) = self.session.exact_range() else { return Ok(()) };
         self.source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
         let bytes = loop {
             match self.source.next(PATIENCE)? {
                 Some((arrived, bytes)) if arrived == range => break bytes,
                 // Something that was wanted before.
-                Some((other, bytes)) => self.remote.take(&other, &bytes)?,
+                Some((other, bytes)) => self.take(&other, &bytes)?,
                 None => {}
             }
         };
-        let taken = self.remote.take_exact(&bytes);
+        let taken = self.session.take_exact(&bytes);
         self.ask();
         Ok(taken?)
     }
 
     /// Gives the source the ranges that are wanted now; whether there are any.
     fn ask(&mut self) -> bool {
-        let wanted = self.remote.wanted();
+        let wanted = self.session.wanted();
+        self.asked = wanted.iter().map(|wanted| wanted.range.clone()).collect();
         self.source.want(&wanted);
         !wanted.is_empty()
     }
 
-    /// The session: its mesh, surfaces, fields.
-    pub fn session(&self) -> &Session {
-        self.remote.session()
+    fn take(&mut self, range: &Range<u64>, bytes: &[u8]) -> Result<(), FormatError> {
+        self.asked.retain(|asked| asked != range);
+        self.session.take(range, bytes)
     }
 
-    /// The session. Blocks for a request [made here](Session::request) are not fetched before the next one.
-    pub fn session_mut(&mut self) -> &mut Session {
-        self.remote.session_mut()
+    /// The session: its mesh, surfaces, fields.
+    pub fn session(&self) -> &Session {
+        &self.session
     }
 
     /// The session alone, without anything to bring more bytes.
     pub fn into_session(self) -> Session {
-        self.remote.into_session()
-    }
-
-    /// The source.
-    pub fn source(&self) -> &S {
-        &self.source
-    }
-
-    /// Bytes of the file that have come, those that came again counted again.
-    pub fn fetched(&self) -> u64 {
-        self.remote.fetched()
-    }
-
-    /// Bytes of the file that have come, each counted once: never more than it has.
-    pub fn arrived(&self) -> u64 {
-        self.remote.arrived()
+        self.session
     }
 
     /// The size of the file, once it is known.
