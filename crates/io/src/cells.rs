@@ -120,7 +120,6 @@ pub(super) enum Numbering {
     /// As many points, of which the first has this number.
     From { first: u32, points: usize },
     /// Each has its own.
-    #[cfg(not(target_arch = "wasm32"))]
     Each(Vec<u32>),
 }
 
@@ -128,7 +127,6 @@ impl Numbering {
     fn points(&self) -> usize {
         match self {
             Self::From { points, .. } => *points,
-            #[cfg(not(target_arch = "wasm32"))]
             Self::Each(numbers) => numbers.len(),
         }
     }
@@ -137,7 +135,6 @@ impl Numbering {
         let index = usize::try_from(point).ok().filter(|p| *p < self.points());
         let number = index.and_then(|p| match self {
             Self::From { first, .. } => u32::try_from(p).ok().and_then(|p| p.checked_add(*first)),
-            #[cfg(not(target_arch = "wasm32"))]
             Self::Each(numbers) => numbers.get(p).copied(),
         });
         let points = self.points() as u64;

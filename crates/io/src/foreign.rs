@@ -159,10 +159,7 @@ const ENDINGS: [(&[&str], Known); 27] = [
 /// Why a file that no reader knows is refused: by what it is, if that is known.
 pub(super) fn refused(name: &str, bytes: &[u8]) -> ReadReason {
     let found = by_content(bytes).or_else(|| by_name(name));
-    found.map_or(ReadReason::UnknownFormat, |(what, remedy)| ReadReason::Unsupported {
-        what: what.into(),
-        remedy: remedy.into(),
-    })
+    found.map_or(ReadReason::UnknownFormat, |(what, remedy)| ReadReason::unsupported(what, remedy))
 }
 
 /// Refuses a file in HDF5 whose root has these groups and datasets, if it is of another format than those that are read: Exodus has no
@@ -178,12 +175,12 @@ pub(super) fn refuse_hdf5(groups: &[String], datasets: &[String]) -> Result<(), 
         MED
     } else if let Some(group) = groups.first() {
         let what = format!("a file in HDF5 with the group \"{group}\", which is neither VTKHDF nor Exodus");
-        let remedy = "convert it to one of these with a tool that reads it; Exodus has all in the root, without groups".into();
-        return Err(ReadReason::Unsupported { what, remedy });
+        let remedy = "convert it to one of these with a tool that reads it; Exodus has all in the root, without groups";
+        return Err(ReadReason::unsupported(what, remedy));
     } else {
         return Ok(());
     };
-    Err(ReadReason::Unsupported { what: what.into(), remedy: remedy.into() })
+    Err(ReadReason::unsupported(what, remedy))
 }
 
 /// Whether XML is of another format than VTK's.
@@ -211,7 +208,7 @@ pub(super) fn refused_folder(path: &Path) -> ReadReason {
     } else {
         ("a folder", "give a file")
     };
-    ReadReason::Unsupported { what: what.into(), remedy: remedy.into() }
+    ReadReason::unsupported(what, remedy)
 }
 
 fn by_content(bytes: &[u8]) -> Option<Known> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::cells::{self, CellList, Numbering};
-use crate::error::ReadReason;
+use crate::error::{ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::number::points_from;
 use crate::{CellData, ReadOptions};
@@ -160,12 +160,8 @@ impl<'a> Draft<'a> {
 
 /// Checks that fields have as many values as there are points or cells, or none.
 fn expect_values(fields: Vec<Field>, expected: usize) -> Result<Vec<Field>, ReadReason> {
-    match fields.iter().find(|field| !field.values.is_empty() && field.values.len() != expected) {
-        Some(Field { name, values, .. }) => Err(ReadReason::Count {
-            what: format!("values of \"{name}\""),
-            expected: expected as u64,
-            found: values.len() as u64,
-        }),
-        None => Ok(fields),
+    for Field { name, values, .. } in fields.iter().filter(|field| !field.values.is_empty()) {
+        expect_count(format!("values of \"{name}\""), expected, values.len())?;
     }
+    Ok(fields)
 }

@@ -9,13 +9,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, shown};
 use crate::formats::gmsh_layout::{Layout, Version};
 use crate::formats::gmsh_mesh::Mesh;
 use crate::formats::gmsh_sections::{read_elements, read_entities, read_nodes, read_partitions};
 use crate::formats::gmsh_views::{self, At as ViewAt, Head, SECTIONS, Steps, View};
-use crate::formats::scanner::Scanner;
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 use crate::{CellData, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -44,7 +44,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     let in_binary = mesh.layout.is_some_and(|layout| layout.binary);
     done.at(|| {
         let place = if in_binary { file.byte_number() } else { file.line_number() };
-        format!("{}, {place}", section.chars().take(24).collect::<String>())
+        format!("{}, {place}", shown(&section))
     })?;
     mesh.finish()
 }
@@ -101,10 +101,7 @@ impl Mesh<'_> {
                 };
                 return self.view(file, self.layout.ok_or_else(missing)?, *at, name);
             }
-            other => {
-                let shown: String = other.chars().take(24).collect();
-                return Err(ReadReason::Syntax(format!("\"{shown}\" instead of a section")));
-            }
+            other => return Err(ReadReason::Syntax(format!("\"{}\" instead of a section", shown(other)))),
         }
         expect_end(file, name)
     }
@@ -250,8 +247,7 @@ fn expect_end(file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
     if end.eq_ignore_ascii_case(&expected) {
         return Ok(());
     }
-    let shown: String = end.chars().take(24).collect();
-    Err(ReadReason::Syntax(format!("\"{shown}\" instead of {expected}")))
+    Err(ReadReason::Syntax(format!("\"{}\" instead of {expected}", shown(end))))
 }
 
 fn read_format(file: &mut Scanner<'_>) -> Result<Layout, ReadReason> {
@@ -281,11 +277,8 @@ fn read_format(file: &mut Scanner<'_>) -> Result<Layout, ReadReason> {
 }
 
 fn unsupported(version: &str) -> ReadReason {
-    let shown: String = version.chars().take(24).collect();
-    ReadReason::Unsupported {
-        what: format!("version \"{shown}\" of Gmsh's format"),
-        remedy: "save it as version 2.2 or 4.1".into(),
-    }
+    let what = format!("version \"{}\" of Gmsh's format", shown(version));
+    ReadReason::unsupported(what, "save it as version 2.2 or 4.1")
 }
 
 /// Steps over a section, which ends with its name behind `$End`.

@@ -4,8 +4,8 @@ use crate::error::ReadReason;
 use crate::formats::gmsh_cells::{Element, element};
 use crate::formats::gmsh_layout::{Layout, Version};
 use crate::formats::gmsh_mesh::Mesh;
-use crate::formats::scanner::Scanner;
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 
 /// Numbers of either encoding.
 struct Numbers<'s, 'a> {
@@ -304,9 +304,11 @@ fn read_element_blocks(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Re
 
 fn known(kind: i64) -> Result<Element, ReadReason> {
     let known = element(kind).filter(|element| !element.is_of_higher_order());
-    known.ok_or_else(|| ReadReason::Unsupported {
-        what: format!("elements of type {kind}"),
-        remedy: "save the mesh with elements of the first or second order".into(),
+    known.ok_or_else(|| {
+        ReadReason::unsupported(
+            format!("elements of type {kind}"),
+            "save the mesh with elements of the first or second order",
+        )
     })
 }
 

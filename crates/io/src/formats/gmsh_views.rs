@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::error::ReadReason;
 use crate::formats::gmsh_layout::Layout;
-use crate::formats::scanner::Scanner;
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 use tetralod::geom::bits_of;
 
 /// What the values of a view are at.

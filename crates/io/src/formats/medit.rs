@@ -3,11 +3,11 @@
 //!
 //! References become the field `ref` at cells. What has no volume is left out.
 
-use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::error::{At, ReadError, ReadReason, in_file, shown};
 use crate::fields::in_order;
 use crate::formats::draft::Draft;
 use crate::formats::medit_cells::{Cells, KINDS, expect_known, ordering};
-use crate::formats::scanner::Scanner;
+use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -208,15 +208,13 @@ pub(super) fn expect_three(dimension: i64) -> Result<(), ReadReason> {
     if dimension == 3 {
         return Ok(());
     }
-    let what = format!("a mesh in {dimension} dimensions");
-    Err(ReadReason::Unsupported { what, remedy: "give a mesh of volumes".into() })
+    Err(ReadReason::unsupported(format!("a mesh in {dimension} dimensions"), "give a mesh of volumes"))
 }
 
 /// Steps over a section that is not needed, up to the next keyword.
 fn skip_numbers(file: &mut Scanner<'_>, keyword: &str) -> Result<(), ReadReason> {
     if !keyword.starts_with(|c: char| c.is_ascii_alphabetic()) {
-        let shown: String = keyword.chars().take(24).collect();
-        return Err(ReadReason::Syntax(format!("\"{shown}\" instead of a keyword")));
+        return Err(ReadReason::Syntax(format!("\"{}\" instead of a keyword", shown(keyword))));
     }
     let is_content = |word: &str| word.parse::<f64>().is_ok() || word.starts_with('"');
     while let Some(word) = file.word_if(is_content) {

@@ -6,8 +6,8 @@ use std::ops::RangeInclusive;
 use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::formats::medit::{Array, FLAT, Parts, SOLUTIONS, components_of, expect_three};
 use crate::formats::medit_cells::{KINDS, expect_known, ordering, refused};
-use crate::formats::scanner::Scanner;
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
