@@ -39,10 +39,7 @@ pub(super) fn times(file: &NcFile) -> Result<Vec<f64>, ReadError> {
 /// Reads a mesh.
 pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let times = times(file)?;
-    if options.step >= times.len().max(1) {
-        let what = format!("time step {} of {}", options.step, times.len().max(1));
-        return Err(ReadReason::Missing(what)).at(String::new);
-    }
+    options.expect_step(times.len()).at(String::new)?;
     let reader = Reader::new(file, options.step as u64).at(String::new)?;
     let mut draft = Draft::new(options);
     draft.coordinates = reader.coordinates().at(|| "coordinates".into())?;
@@ -52,7 +49,7 @@ pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, Read
         reader.variables_at_elements(&blocks, &mut draft)?;
     }
     let numbers = reader.numbers_of_blocks(&blocks).at(|| "eb_prop1".into())?;
-    draft.at_cells("block", 1, numbers, true).at(|| "eb_prop1".into())?;
+    draft.at_cells("block", 1, true, || Ok(numbers)).at(|| "eb_prop1".into())?;
     let mut mesh = draft.finish().at(|| "element blocks".into())?;
     let time = times.get(options.step).copied();
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
@@ -198,7 +195,7 @@ impl<'a> Reader<'a> {
                 };
                 expect(points, values)
             };
-            draft.read_at_points(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
+            draft.at_points(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
         }
         Ok(())
     }
@@ -220,7 +217,7 @@ impl<'a> Reader<'a> {
                 }
                 Ok(values)
             };
-            draft.read_at_cells(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
+            draft.at_cells(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
         }
         Ok(())
     }

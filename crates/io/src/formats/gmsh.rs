@@ -10,7 +10,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{At, ReadError, ReadReason, shown};
-use crate::formats::gmsh_layout::{Layout, Version};
+use crate::formats::gmsh_layout::{Layout, Numbers, Version};
 use crate::formats::gmsh_mesh::Mesh;
 use crate::formats::gmsh_sections::{read_elements, read_entities, read_nodes, read_partitions};
 use crate::formats::gmsh_views::{self, At as ViewAt, Head, SECTIONS, Steps, View};
@@ -83,23 +83,24 @@ const HARMLESS: [&str; 7] = [
 impl Mesh<'_> {
     fn section(&mut self, file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
         let missing = || ReadReason::Missing("section $MeshFormat".into());
+        let numbers = self.layout.map(|layout| Numbers { file: &mut *file, layout });
         match name {
             "$MeshFormat" => self.layout = Some(read_format(file)?),
             // These sections are of version 1 alone.
             "$NOD" | "$ELM" => return Err(unsupported("1")),
-            "$Entities" => read_entities(self, file, self.layout.ok_or_else(missing)?)?,
-            "$Nodes" => read_nodes(self, file, self.layout.ok_or_else(missing)?)?,
-            "$Elements" => read_elements(self, file, self.layout.ok_or_else(missing)?)?,
+            "$Entities" => read_entities(self, &mut numbers.ok_or_else(missing)?)?,
+            "$Nodes" => read_nodes(self, &mut numbers.ok_or_else(missing)?)?,
+            "$Elements" => read_elements(self, &mut numbers.ok_or_else(missing)?)?,
             "$PartitionedEntities"
                 if self.layout.is_some_and(|layout| layout.version == Version::FourOne) =>
             {
-                read_partitions(self, file, self.layout.ok_or_else(missing)?)?;
+                read_partitions(self, &mut numbers.ok_or_else(missing)?)?;
             }
             _ if name.starts_with('$') => {
                 let Some((_, at)) = SECTIONS.iter().find(|(known, _)| *known == name) else {
                     return self.skip(file, name);
                 };
-                return self.view(file, self.layout.ok_or_else(missing)?, *at, name);
+                return self.view(&mut numbers.ok_or_else(missing)?, *at, name);
             }
             other => return Err(ReadReason::Syntax(format!("\"{}\" instead of a section", shown(other)))),
         }
@@ -116,24 +117,16 @@ impl Mesh<'_> {
     }
 
     /// Reads a view, if it is wanted.
-    fn view(
-        &mut self,
-        file: &mut Scanner<'_>,
-        layout: Layout,
-        at: ViewAt,
-        section: &str,
-    ) -> Result<(), ReadReason> {
-        let head = gmsh_views::read_head(file, at)?;
+    fn view(&mut self, numbers: &mut Numbers<'_, '_>, at: ViewAt, section: &str) -> Result<(), ReadReason> {
+        let head = gmsh_views::read_head(numbers.file, at)?;
         self.heads.push(head.clone());
         let is_at_cells = at == ViewAt::Elements;
-        if is_at_cells && self.draft.options.cells != CellData::Values && !layout.binary {
-            let rows = HashMap::new();
-            self.views.push(View { head, rows });
-            return skip_section(file, section);
+        if is_at_cells && self.draft.options.cells != CellData::Values && !numbers.layout.binary {
+            self.views.push(View { head, rows: HashMap::new() });
+            return skip_section(numbers.file, section);
         }
-        let view = gmsh_views::read_rows(file, layout, head)?;
-        self.views.push(view);
-        expect_end(file, section)
+        self.views.push(gmsh_views::read_rows(numbers, head)?);
+        expect_end(numbers.file, section)
     }
 
     fn finish(mut self) -> Result<TetMesh, ReadError> {
@@ -141,11 +134,8 @@ impl Mesh<'_> {
             return Err(ReadReason::Missing("section $Nodes".into())).at(String::new);
         }
         let steps = Steps::of(&self.heads);
+        self.draft.options.expect_step(steps.times.len()).at(String::new)?;
         let step = self.draft.options.step;
-        if step >= steps.times.len().max(1) {
-            let what = format!("time step {step} of {}", steps.times.len().max(1));
-            return Err(ReadReason::Missing(what)).at(String::new);
-        }
         let of_step = std::mem::take(&mut self.views).into_iter().filter(|view| steps.has(&view.head, step));
         for view in gmsh_views::merge(of_step.collect()).at(String::new)? {
             let place = || format!("view \"{}\"", view.head.name);
@@ -155,7 +145,7 @@ impl Mesh<'_> {
             [("physical", std::mem::take(&mut self.physical)), ("entity", std::mem::take(&mut self.entities))]
         {
             if !values.is_empty() {
-                self.draft.at_cells(name, 1, values, true).at(String::new)?;
+                self.draft.at_cells(name, 1, true, || Ok(values)).at(String::new)?;
             }
         }
         let skipped = self.skipped.into_iter().map(|name| format!("section {name} is left out"));
@@ -179,7 +169,7 @@ impl Mesh<'_> {
                 let cells = &self.cell_tags;
                 let values =
                     || rows_of(cells.iter().map(|tag| (*tag, true)), &view.rows, *components, "element");
-                self.draft.read_at_cells(name, *components, false, values)
+                self.draft.at_cells(name, *components, false, values)
             }
             ViewAt::ElementNodes if *has_scheme => {
                 self.draft
@@ -207,7 +197,7 @@ impl Mesh<'_> {
                 "view \"{name}\": elements have different values at {count} nodes (by up to {largest}); their mean is taken"
             ));
         }
-        self.draft.at_points(name, *components, values, false)
+        self.draft.at_points(name, *components, false, || Ok(values))
     }
 
     /// The values at nodes in their order. Nodes that no element with a volume uses need none; theirs are 0.

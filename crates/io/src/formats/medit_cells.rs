@@ -135,7 +135,7 @@ impl Cells {
             }
             references.extend(self.references_of_quadratic.get(kind).into_iter().flatten());
         }
-        draft.at_cells("ref", 1, references, true)
+        draft.at_cells("ref", 1, true, || Ok(references))
     }
 }
 

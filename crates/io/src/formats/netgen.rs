@@ -80,7 +80,7 @@ fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRe
     if draft.coordinates.is_empty() {
         return Err(ReadReason::Missing("section points".into()));
     }
-    draft.at_cells("material", 1, materials, true)
+    draft.at_cells("material", 1, true, || Ok(materials))
 }
 
 /// VTK's type of triangles: what surfaces are mostly of.

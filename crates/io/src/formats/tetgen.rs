@@ -81,7 +81,7 @@ fn read_nodes(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<i64, Read
     }
     for i in 0..attributes.min(values.len()) {
         let of_one = component_of(&values, i, attributes);
-        draft.at_points(&format!("attribute_{}", i + 1), 1, of_one, false)?;
+        draft.at_points(&format!("attribute_{}", i + 1), 1, false, || Ok(of_one))?;
     }
     Ok(first)
 }
@@ -110,7 +110,7 @@ fn read_cells(file: &mut Scanner<'_>, draft: &mut Draft<'_>, first: i64) -> Resu
     add_cells(draft, &cells, points);
     for i in 0..attributes.min(values.len()) {
         let of_one = component_of(&values, i, attributes);
-        draft.at_cells(&format!("region_{}", i + 1), 1, of_one, false)?;
+        draft.at_cells(&format!("region_{}", i + 1), 1, false, || Ok(of_one))?;
     }
     Ok(())
 }

@@ -55,10 +55,7 @@ pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, Re
     let times = times(file)?;
     let step = (!times.is_empty()).then_some(options.step as u64);
     let mut reader = Reader { file, options, step, axes: 1, known: RefCell::default() };
-    if options.step >= times.len().max(1) {
-        let what = format!("time step {} of {}", options.step, times.len().max(1));
-        return Err(ReadReason::Missing(what)).at(place);
-    }
+    options.expect_step(times.len()).at(place)?;
     let version = reader.attribute("Version").at(place)?;
     if !version.first().is_some_and(|major| MAJOR_VERSIONS.contains(major)) {
         let what = format!("version {version:?} of VTKHDF");
