@@ -48,7 +48,6 @@ impl<'a> FilesOf<'a> {
     }
 
     /// The one that was read last.
-    #[cfg(not(target_arch = "wasm32"))]
     pub fn last(&self) -> Option<PathBuf> {
         self.read.borrow().last().cloned()
     }

@@ -106,11 +106,7 @@ type Middles = Vec<(u8, &'static [u8])>;
 struct Recipes(BTreeMap<i64, Option<(Recipe, Middles)>>);
 
 impl Recipes {
-    fn of(&mut self, kind: i64) -> Option<&Recipe> {
-        self.with_middles(kind).map(|(recipe, _)| recipe)
-    }
-
-    fn with_middles(&mut self, kind: i64) -> Option<&(Recipe, Middles)> {
+    fn of(&mut self, kind: i64) -> Option<&(Recipe, Middles)> {
         self.0.entry(kind).or_insert_with(|| recipe(kind).map(|recipe| (recipe, middles(kind)))).as_ref()
     }
 }
@@ -120,7 +116,6 @@ pub(super) enum Numbering {
     /// As many points, of which the first has this number.
     From { first: u32, points: usize },
     /// Each has its own.
-    #[cfg(not(target_arch = "wasm32"))]
     Each(Vec<u32>),
 }
 
@@ -128,7 +123,6 @@ impl Numbering {
     fn points(&self) -> usize {
         match self {
             Self::From { points, .. } => *points,
-            #[cfg(not(target_arch = "wasm32"))]
             Self::Each(numbers) => numbers.len(),
         }
     }
@@ -137,7 +131,6 @@ impl Numbering {
         let index = usize::try_from(point).ok().filter(|p| *p < self.points());
         let number = index.and_then(|p| match self {
             Self::From { first, .. } => u32::try_from(p).ok().and_then(|p| p.checked_add(*first)),
-            #[cfg(not(target_arch = "wasm32"))]
             Self::Each(numbers) => numbers.get(p).copied(),
         });
         let points = self.points() as u64;
@@ -149,7 +142,8 @@ impl Numbering {
 pub(super) fn checked_ends(types: &[i64], ends: &[i64]) -> Result<usize, ReadReason> {
     let (mut start, mut recipes) = (0, Recipes::default());
     for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
-        let needed = recipes.of(kind).map(|recipe| recipe.points as i64).or_else(|| points_of_flat(kind));
+        let needed =
+            recipes.of(kind).map(|(recipe, _)| recipe.points as i64).or_else(|| points_of_flat(kind));
         let found = end.checked_sub(start).filter(|n| *n >= 0);
         let found = found
             .ok_or_else(|| ReadReason::Syntax(format!("cell {cell} ends at {end}, before it begins")))?;
@@ -227,7 +221,51 @@ pub(super) struct CellList {
 impl CellList {
     /// Splits the cells, and drops them.
     pub fn split(self, numbering: &Numbering, memory: &MemoryLimit) -> Result<Split, ReadReason> {
-        split(&self, numbering, memory)
+        let Self { types, ends, connectivity } = &self;
+        let mut split = Split::default();
+        if !types.is_empty() && types.iter().all(|kind| [HIDDEN, GHOST].contains(kind)) {
+            split.describe(types);
+            return Ok(split);
+        }
+        let tets = most_tets(types)?;
+        let room = usize::try_from(tets).unwrap_or(usize::MAX);
+        if types.len() > u32::MAX as usize || room > u32::MAX as usize {
+            return Err(ReadReason::TooLarge { what: "cells".into(), limit: u64::from(u32::MAX) });
+        }
+        // With the number of its cell.
+        memory.take(20 * tets)?;
+        split.tets.reserve_exact(room);
+        let (mut start, mut recipes) = (0, Recipes::default());
+        let (mut vertices, mut known) = (Vec::new(), BitSet::default());
+        for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
+            let end = usize::try_from(end).unwrap_or(usize::MAX);
+            let listed = connectivity.get(start..end);
+            let listed = listed.ok_or_else(|| ReadReason::Missing(format!("a point of cell {cell}")))?;
+            start = end;
+            let first = split.tets.len();
+            if let Some((recipe, middles)) = recipes.of(kind) {
+                vertices.clear();
+                for &point in listed {
+                    vertices.push(numbering.of(cell, point)?);
+                }
+                match vertices.as_slice() {
+                    &[a, b, c, d] if kind == TETRAHEDRON => split.tets.push([a, b, c, d]),
+                    vertices => recipe.split(vertices, &mut split.tets),
+                }
+                for (point, corners) in middles {
+                    let vertex = |p: &u8| vertices[usize::from(*p)];
+                    if known.insert(vertex(point)) {
+                        split.input.middles.push(vertex(point), corners.iter().map(vertex));
+                    }
+                }
+            }
+            split.came_from(cell, first);
+        }
+        if split.tets.len() < split.tets.capacity() / 2 {
+            split.tets.shrink_to_fit();
+        }
+        split.describe(types);
+        Ok(split)
     }
 
     /// Which of so many points cells with a volume use.
@@ -284,57 +322,6 @@ impl CellList {
             self.solid().filter(|(_, listed)| listed.iter().any(is_hidden)).map(|(cell, _)| cell).collect();
         cells.into_iter().for_each(|cell| self.types[cell] = HIDDEN);
     }
-}
-
-fn split(
-    CellList { types, ends, connectivity }: &CellList,
-    numbering: &Numbering,
-    memory: &MemoryLimit,
-) -> Result<Split, ReadReason> {
-    let mut split = Split::default();
-    if !types.is_empty() && types.iter().all(|kind| [HIDDEN, GHOST].contains(kind)) {
-        split.describe(types);
-        return Ok(split);
-    }
-    let tets = most_tets(types)?;
-    let room = usize::try_from(tets).unwrap_or(usize::MAX);
-    if types.len() > u32::MAX as usize || room > u32::MAX as usize {
-        return Err(ReadReason::TooLarge { what: "cells".into(), limit: u64::from(u32::MAX) });
-    }
-    // With the number of its cell.
-    memory.take(20 * tets)?;
-    split.tets.reserve_exact(room);
-    let (mut start, mut recipes) = (0, Recipes::default());
-    let (mut vertices, mut known) = (Vec::new(), BitSet::default());
-    for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
-        let end = usize::try_from(end).unwrap_or(usize::MAX);
-        let listed = connectivity.get(start..end);
-        let listed = listed.ok_or_else(|| ReadReason::Missing(format!("a point of cell {cell}")))?;
-        start = end;
-        let first = split.tets.len();
-        if let Some((recipe, middles)) = recipes.with_middles(kind) {
-            vertices.clear();
-            for &point in listed {
-                vertices.push(numbering.of(cell, point)?);
-            }
-            match vertices.as_slice() {
-                &[a, b, c, d] if kind == TETRAHEDRON => split.tets.push([a, b, c, d]),
-                vertices => recipe.split(vertices, &mut split.tets),
-            }
-            for (point, corners) in middles {
-                let vertex = |p: &u8| vertices[usize::from(*p)];
-                if known.insert(vertex(point)) {
-                    split.input.middles.push(vertex(point), corners.iter().map(vertex));
-                }
-            }
-        }
-        split.came_from(cell, first);
-    }
-    if split.tets.len() < split.tets.capacity() / 2 {
-        split.tets.shrink_to_fit();
-    }
-    split.describe(types);
-    Ok(split)
 }
 
 #[cfg(test)]

@@ -120,6 +120,29 @@ pub enum ReadReason {
     },
 }
 
+impl ReadReason {
+    /// That something is valid but not read here, and what to do instead.
+    pub(crate) fn unsupported(what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Unsupported { what: what.into(), remedy: remedy.into() }
+    }
+}
+
+/// Checks that there are as many of something as there should be.
+pub(super) fn expect_count(
+    what: impl Into<String>,
+    expected: impl TryInto<u64>,
+    found: impl TryInto<u64>,
+) -> Result<(), ReadReason> {
+    // What is counted is in memory, or a number of a file.
+    let [expected, found] = [expected.try_into().unwrap_or(u64::MAX), found.try_into().unwrap_or(u64::MAX)];
+    if expected == found { Ok(()) } else { Err(ReadReason::Count { what: what.into(), expected, found }) }
+}
+
+/// What of a word is put into messages.
+pub(super) fn shown(word: &str) -> String {
+    word.chars().take(24).collect()
+}
+
 /// Bytes in words.
 fn mebibytes(bytes: u64) -> String {
     if bytes < 10 << 20 { format!("{bytes} bytes") } else { format!("{} MiB", bytes >> 20) }

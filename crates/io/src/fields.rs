@@ -299,7 +299,6 @@ fn length(vector: &[f64]) -> f64 {
 }
 
 /// Some components of values that have so many each, in this order.
-#[cfg(not(target_arch = "wasm32"))]
 pub(super) fn in_order(values: &[f64], components: usize, order: &[usize]) -> Vec<f64> {
     values.chunks_exact(components).flat_map(|tuple| order.iter().map(|&c| tuple[c])).collect()
 }

@@ -37,6 +37,10 @@ const UNV: Known =
     ("an I-deas universal file", "convert it with Gmsh to .msh: `gmsh FILE -save -o mesh.msh`");
 const PLOT3D: Known = ("a file of PLOT3D", "open it in ParaView and save it as .vts");
 const MED: Known = ("a mesh of MED (Salome)", MESHIO);
+const TIFF: Known = ("a TIFF picture", PICTURE);
+const STL: Known = ("a surface mesh (STL)", SURFACE);
+const SU2: Known = ("a mesh of SU2", MESHIO);
+const COMSOL: Known = ("a mesh of COMSOL", "save it as .vtu in COMSOL");
 const ZARR: Known = (
     "a Zarr store",
     "read it in Python, and save it as raw samples with a .json sidecar, or with SimpleITK as NRRD",
@@ -45,72 +49,45 @@ const HDF5: Known =
     ("a file in HDF5 or netCDF, which this build of tetralod leaves out,", "use one with the feature hdf5");
 
 /// What files begin with, behind white space and before whatever follows.
-const BEGINNINGS: [(&[u8], Known); 59] = [
-    (b"MFEM ", MFEM),
+const BEGINNINGS: [(&[&[u8]], Known); 29] = [
+    (&[b"MFEM "], MFEM),
     (
-        b"version https://git-lfs",
+        &[b"version https://git-lfs"],
         ("a pointer of Git LFS, which stands for a file,", "fetch that with `git lfs pull`"),
     ),
-    (b"\x89PNG", ("a PNG picture", PICTURE)),
-    (b"II*\0", ("a TIFF picture", PICTURE)),
-    (b"MM\0*", ("a TIFF picture", PICTURE)),
-    (b"II+\0", ("a TIFF picture", PICTURE)),
-    (b"\xff\xd8\xff", ("a JPEG picture", PICTURE)),
-    (b"BM", ("a BMP picture", PICTURE)),
-    (b"GIF8", ("a GIF picture", PICTURE)),
-    (b"ISO-10303-21", STEP),
-    (b"<?xml version=\"1.0\" ?><!DOCTYPE Xdmf", XDMF),
-    (b"<Xdmf", XDMF),
-    (b"<!DOCTYPE Xdmf", XDMF),
-    (b"#!TDV", TECPLOT),
-    (b"TITLE", TECPLOT),
-    (b"VARIABLES", TECPLOT),
-    (b"Variables", TECPLOT),
-    (b"EnSight ", ENSIGHT),
-    (b"C Binary", ENSIGHT),
-    (b"Fortran Binary", ENSIGHT),
-    (b"FORMAT\ntype:", ENSIGHT),
-    (b"FORMAT\r\ntype:", ENSIGHT),
-    (b"*KEYWORD", LS_DYNA),
-    (b"*HEADING", ABAQUS),
-    (b"*Heading", ABAQUS),
-    (b"*heading", ABAQUS),
-    (b"*NODE", ABAQUS),
-    (b"*Node", ABAQUS),
-    (b"*PART", ABAQUS),
-    (b"*Part", ABAQUS),
-    (b"*INCLUDE", ABAQUS),
-    (b"**", ABAQUS),
-    (b"/COM", ANSYS),
-    (b"/PREP7", ANSYS),
-    (b"/BATCH", ANSYS),
-    (b"SOL ", NASTRAN),
-    (b"BEGIN BULK", NASTRAN),
-    (b"CEND", NASTRAN),
-    (b"GRID", NASTRAN),
-    (b"NASTRAN", NASTRAN),
-    (b"(0 \"", FLUENT),
-    (b"(1 \"", FLUENT),
-    (b"(0\"", FLUENT),
-    (b"(2 3)", FLUENT),
-    (b"(2 2)", FLUENT),
-    (b"solid", ("a surface mesh (STL)", SURFACE)),
-    (b"ply\n", ("a surface mesh (PLY)", SURFACE)),
-    (b"ply\r\n", ("a surface mesh (PLY)", SURFACE)),
-    (b"OFF", ("a surface mesh (OFF)", SURFACE)),
-    (b"glTF", ("a surface mesh (glTF)", SURFACE)),
-    (b"NDIME", ("a mesh of SU2", MESHIO)),
-    (b"# Created by COMSOL", ("a mesh of COMSOL", "save it as .vtu in COMSOL")),
-    (b"\x93NUMPY", ("an array of NumPy", "save it as raw samples with a .json sidecar")),
+    (&[b"\x89PNG"], ("a PNG picture", PICTURE)),
+    (&[b"II*\0", b"MM\0*", b"II+\0"], TIFF),
+    (&[b"\xff\xd8\xff"], ("a JPEG picture", PICTURE)),
+    (&[b"BM"], ("a BMP picture", PICTURE)),
+    (&[b"GIF8"], ("a GIF picture", PICTURE)),
+    (&[b"ISO-10303-21"], STEP),
+    (&[b"<?xml version=\"1.0\" ?><!DOCTYPE Xdmf", b"<Xdmf", b"<!DOCTYPE Xdmf"], XDMF),
+    (&[b"#!TDV", b"TITLE", b"VARIABLES", b"Variables"], TECPLOT),
+    (&[b"EnSight ", b"C Binary", b"Fortran Binary", b"FORMAT\ntype:", b"FORMAT\r\ntype:"], ENSIGHT),
+    (&[b"*KEYWORD"], LS_DYNA),
     (
-        b"SIMPLE  =",
+        &[b"*HEADING", b"*Heading", b"*heading", b"*NODE", b"*Node", b"*PART", b"*Part", b"*INCLUDE", b"**"],
+        ABAQUS,
+    ),
+    (&[b"/COM", b"/PREP7", b"/BATCH"], ANSYS),
+    (&[b"SOL ", b"BEGIN BULK", b"CEND", b"GRID", b"NASTRAN"], NASTRAN),
+    (&[b"(0 \"", b"(1 \"", b"(0\"", b"(2 3)", b"(2 2)"], FLUENT),
+    (&[b"solid"], STL),
+    (&[b"ply\n", b"ply\r\n"], ("a surface mesh (PLY)", SURFACE)),
+    (&[b"OFF"], ("a surface mesh (OFF)", SURFACE)),
+    (&[b"glTF"], ("a surface mesh (glTF)", SURFACE)),
+    (&[b"NDIME"], SU2),
+    (&[b"# Created by COMSOL"], COMSOL),
+    (&[b"\x93NUMPY"], ("an array of NumPy", "save it as raw samples with a .json sidecar")),
+    (
+        &[b"SIMPLE  ="],
         ("a FITS image", "read it in Python (astropy), and save it as raw samples with a .json sidecar"),
     ),
-    (b"MATLAB 5.0", ("a file of MATLAB", "save it as raw samples with a .json sidecar, or as .vtu")),
-    (b"PK\x03\x04", ("an archive (ZIP)", UNPACK)),
-    (b"BZh", ("a file compressed by bzip2", UNPACK)),
-    (b"\x28\xb5\x2f\xfd", ("a file compressed by Zstandard", UNPACK)),
-    (b"\xfd7zXZ", ("a file compressed by xz", UNPACK)),
+    (&[b"MATLAB 5.0"], ("a file of MATLAB", "save it as raw samples with a .json sidecar, or as .vtu")),
+    (&[b"PK\x03\x04"], ("an archive (ZIP)", UNPACK)),
+    (&[b"BZh"], ("a file compressed by bzip2", UNPACK)),
+    (&[b"\x28\xb5\x2f\xfd"], ("a file compressed by Zstandard", UNPACK)),
+    (&[b"\xfd7zXZ"], ("a file compressed by xz", UNPACK)),
 ];
 
 /// What files are by the ending of their names, where the content does not say it.
@@ -133,15 +110,15 @@ const ENDINGS: [(&[&str], Known); 27] = [
     (&["unv"], UNV),
     (&["p3d", "xyz", "q"], PLOT3D),
     (&["zarr"], ZARR),
-    (&["tif", "tiff"], ("a TIFF picture", PICTURE)),
-    (&["stl"], ("a surface mesh (STL)", SURFACE)),
+    (&["tif", "tiff"], TIFF),
+    (&["stl"], STL),
     (&["obj"], ("a surface mesh (Wavefront)", SURFACE)),
     (
         &["face", "edge", "neigh", "poly", "smesh"],
         ("a file of TetGen without tetrahedra", "give its .node or .ele file"),
     ),
-    (&["su2"], ("a mesh of SU2", MESHIO)),
-    (&["mphtxt", "mphbin"], ("a mesh of COMSOL", "save it as .vtu in COMSOL")),
+    (&["su2"], SU2),
+    (&["mphtxt", "mphbin"], COMSOL),
     (&["med"], MED),
     (
         &["vdb"],
@@ -159,10 +136,7 @@ const ENDINGS: [(&[&str], Known); 27] = [
 /// Why a file that no reader knows is refused: by what it is, if that is known.
 pub(super) fn refused(name: &str, bytes: &[u8]) -> ReadReason {
     let found = by_content(bytes).or_else(|| by_name(name));
-    found.map_or(ReadReason::UnknownFormat, |(what, remedy)| ReadReason::Unsupported {
-        what: what.into(),
-        remedy: remedy.into(),
-    })
+    found.map_or(ReadReason::UnknownFormat, |(what, remedy)| ReadReason::unsupported(what, remedy))
 }
 
 /// Refuses a file in HDF5 whose root has these groups and datasets, if it is of another format than those that are read: Exodus has no
@@ -178,12 +152,12 @@ pub(super) fn refuse_hdf5(groups: &[String], datasets: &[String]) -> Result<(), 
         MED
     } else if let Some(group) = groups.first() {
         let what = format!("a file in HDF5 with the group \"{group}\", which is neither VTKHDF nor Exodus");
-        let remedy = "convert it to one of these with a tool that reads it; Exodus has all in the root, without groups".into();
-        return Err(ReadReason::Unsupported { what, remedy });
+        let remedy = "convert it to one of these with a tool that reads it; Exodus has all in the root, without groups";
+        return Err(ReadReason::unsupported(what, remedy));
     } else {
         return Ok(());
     };
-    Err(ReadReason::Unsupported { what: what.into(), remedy: remedy.into() })
+    Err(ReadReason::unsupported(what, remedy))
 }
 
 /// Whether XML is of another format than VTK's.
@@ -211,7 +185,7 @@ pub(super) fn refused_folder(path: &Path) -> ReadReason {
     } else {
         ("a folder", "give a file")
     };
-    ReadReason::Unsupported { what: what.into(), remedy: remedy.into() }
+    ReadReason::unsupported(what, remedy)
 }
 
 fn by_content(bytes: &[u8]) -> Option<Known> {
@@ -247,10 +221,9 @@ fn by_content(bytes: &[u8]) -> Option<Known> {
     if start.starts_with(b"<") && has(b"<dolfin") {
         return Some(("a mesh of DOLFIN", MESHIO));
     }
-    if let Some((_, known)) = BEGINNINGS.iter().find(|(beginning, _)| start.starts_with(beginning)) {
-        return Some(*known);
-    }
-    by_lines(head)
+    let begins = |beginnings: &[&[u8]]| beginnings.iter().any(|beginning| start.starts_with(beginning));
+    let known = BEGINNINGS.iter().find(|(beginnings, _)| begins(beginnings)).map(|(_, known)| *known);
+    known.or_else(|| by_lines(head))
 }
 
 /// What is known by more than its first words.

@@ -3,7 +3,7 @@
 //! Every cube is split as that of a regular grid, so neighbours agree.
 
 use crate::MemoryLimit;
-use crate::error::ReadReason;
+use crate::error::{ReadReason, expect_count};
 use crate::fields::{check_finite, check_finite_cells};
 use crate::ghosts::HIDDEN_POINT;
 use crate::{cell_types, cells};
@@ -19,10 +19,7 @@ pub(super) type Extent = [i64; 6];
 pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Grid, ReadReason> {
     if dims.iter().any(|d| *d < 2) {
         let what = format!("a grid of {} x {} x {} points", dims[0], dims[1], dims[2]);
-        return Err(ReadReason::Unsupported {
-            what,
-            remedy: "give at least two points along each axis".into(),
-        });
+        return Err(ReadReason::unsupported(what, "give at least two points along each axis"));
     }
     let points = dims.iter().try_fold(1_u64, |n, d| n.checked_mul(*d));
     if points.is_none_or(|n| n > MAX_GRID_POINTS) {
@@ -31,7 +28,7 @@ pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) 
     let far = [0, 1, 2].map(|i| origin[i] + spacing[i] * dims[i] as f64);
     if far.iter().chain(&origin).any(|x| !x.is_finite()) || spacing.iter().any(|s| s.is_nan() || *s <= 0.0) {
         let what = format!("a grid with spacing {spacing:?} and origin {origin:?}");
-        return Err(ReadReason::Unsupported { what, remedy: "spacing must be positive, both finite".into() });
+        return Err(ReadReason::unsupported(what, "spacing must be positive, both finite"));
     }
     // Each dimension is at most the number of points.
     Ok(Grid { dims: dims.map(|d| d as u32), origin, spacing })
@@ -122,10 +119,7 @@ pub(super) fn placed(
     let is_finite = [&origin[..], steps.as_flattened()].into_iter().flatten().all(|x| x.is_finite());
     if !is_finite || steps.iter().any(is_flat) {
         let what = format!("a grid with spacing {spacing:?}, origin {origin:?} and directions {direction:?}");
-        return Err(ReadReason::Unsupported {
-            what,
-            remedy: "spacing and directions must be finite and not 0".into(),
-        });
+        return Err(ReadReason::unsupported(what, "spacing and directions must be finite and not 0"));
     }
     // VTK's origin is the position of index (0, 0, 0), which need not be in the grid.
     let first = [0, 1, 2].map(|i| {
@@ -226,11 +220,7 @@ pub(super) fn mesh(
     values: GridValues,
     memory: &MemoryLimit,
 ) -> Result<TetMesh, ReadReason> {
-    let expected = dims.iter().map(|d| u64::from(*d)).product();
-    if positions.len() as u64 != expected {
-        let found = positions.len() as u64;
-        return Err(ReadReason::Count { what: "points".into(), expected, found });
-    }
+    expect_count("points", dims.iter().map(|d| u64::from(*d)).product::<u64>(), positions.len())?;
     memory.take(bytes(dims))?;
     with_values(TetMesh { positions, tets: kuhn_tets(dims), ..TetMesh::default() }, dims, values, memory)
 }

@@ -5,11 +5,12 @@
 //! offsets and connectivity, older ones as counts followed by indices.
 
 use crate::cells::{CellList, Numbering};
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count, shown};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
 use crate::grid::{self, Ghosts, GridValues, Placement};
 use crate::number::{NumberType, points_from};
+use crate::scanner::Scanner;
 use crate::{CellData, MemoryLimit, ReadOptions, Survey, cell_types, cells};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
@@ -24,10 +25,7 @@ const KINDS: [&str; 5] =
 pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let (mut file, kind, time) = Reader::open(bytes).at(|| "header".into())?;
     let mut body = Body::new(options, time);
-    while let Some(keyword) = file.next_word().at(|| "body".into())? {
-        let keyword = keyword.to_ascii_lowercase();
-        body.section(&mut file, &keyword).at(|| shortened(&keyword).to_ascii_uppercase())?;
-    }
+    body.read(&mut file)?;
     let time = body.time;
     let mut mesh = match kind.as_str() {
         "unstructured_grid" => body.unstructured(&file)?,
@@ -47,10 +45,7 @@ pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
     let options = ReadOptions { cells: CellData::Names, ..ReadOptions::default() };
     let [fields, cell_fields] = [(); 2].map(|()| Collector::of_names());
     let mut body = Body { skims: true, fields, cell_fields, ..Body::new(&options, None) };
-    while let Some(keyword) = file.next_word().at(|| "body".into())? {
-        let keyword = keyword.to_ascii_lowercase();
-        body.section(&mut file, &keyword).at(|| shortened(&keyword).to_ascii_uppercase())?;
-    }
+    body.read(&mut file)?;
     if kind == "structured_points" {
         let placement = body.placement()?;
         let fields = [body.fields.fields, body.cell_fields.fields];
@@ -87,9 +82,9 @@ impl Kind {
         match name.to_ascii_lowercase().as_str() {
             "bit" => Ok(Self::Bit),
             "string" | "utf8_string" => Ok(Self::Text),
-            lower => NumberType::legacy(lower).map(Self::Number).ok_or_else(|| {
-                ReadReason::Syntax(format!("number type \"{}\" is not known", shortened(name)))
-            }),
+            lower => NumberType::legacy(lower)
+                .map(Self::Number)
+                .ok_or_else(|| ReadReason::Syntax(format!("number type \"{}\" is not known", shown(name)))),
         }
     }
 
@@ -102,18 +97,13 @@ impl Kind {
     }
 }
 
-fn shortened(text: &str) -> String {
-    text.chars().take(24).collect()
-}
-
 fn instead(found: &str, expected: &str) -> ReadReason {
-    ReadReason::Syntax(format!("\"{}\" instead of {expected}", shortened(found)))
+    ReadReason::Syntax(format!("\"{}\" instead of {expected}", shown(found)))
 }
 
-/// A position in the file.
+/// A position in the file, and how its numbers are written.
 struct Reader<'a> {
-    bytes: &'a [u8],
-    at: usize,
+    words: Scanner<'a>,
     binary: bool,
     version: u32,
     is_before_5_1: bool,
@@ -125,26 +115,28 @@ impl<'a> Reader<'a> {
     /// Reads the header up to the data set's type, in lower case, and the time that the data set is of.
     fn open(bytes: &'a [u8]) -> Result<(Self, String, Option<f64>), ReadReason> {
         let mut time = None;
-        let mut file =
-            Self { bytes, at: MAGIC.len(), binary: false, version: 0, is_before_5_1: true, skims: false };
-        let version = file.line()?.trim();
+        let words = Scanner::new(bytes.get(MAGIC.len()..).unwrap_or_default());
+        let mut file = Self { words, binary: false, version: 0, is_before_5_1: true, skims: false };
+        let version = text(file.words.line())?.trim();
         let mut numbers = version.split('.').map(|number| number.parse().ok());
         let major = numbers.next().flatten().filter(|major| (1..=5).contains(major));
         let minor: u32 = numbers.next().flatten().unwrap_or(0);
-        file.version = major.ok_or_else(|| ReadReason::Unsupported {
-            what: format!("version \"{}\"", shortened(version)),
-            remedy: "write it as version 1.0 to 5.1".into(),
+        file.version = major.ok_or_else(|| {
+            ReadReason::unsupported(
+                format!("version \"{}\"", shown(version)),
+                "write it as version 1.0 to 5.1",
+            )
         })?;
         file.is_before_5_1 = file.version < 5 || file.version == 5 && minor < 1;
         // The title may hold any bytes.
-        file.skip_line();
-        file.binary = match file.word()?.to_ascii_lowercase().as_str() {
+        file.words.skip_line();
+        file.binary = match file.words.word()?.to_ascii_lowercase().as_str() {
             "ascii" => false,
             "binary" => true,
             other => return Err(instead(other, "ASCII or BINARY")),
         };
         loop {
-            match file.word()?.to_ascii_lowercase().as_str() {
+            match file.words.word()?.to_ascii_lowercase().as_str() {
                 "dataset" => break,
                 // Field data may come before the data set.
                 "field" => time = file.time_in_field()?.or(time),
@@ -152,83 +144,36 @@ impl<'a> Reader<'a> {
                 other => return Err(instead(other, "DATASET")),
             }
         }
-        let kind = file.word()?.to_ascii_lowercase();
+        let kind = file.words.word()?.to_ascii_lowercase();
         if !KINDS.contains(&kind.as_str()) {
-            let what = format!("a data set of type {}", shortened(&kind).to_ascii_uppercase());
-            let remedy = "give an unstructured, structured or rectilinear grid, or structured points".into();
-            return Err(ReadReason::Unsupported { what, remedy });
+            let what = format!("a data set of type {}", shown(&kind).to_ascii_uppercase());
+            let remedy = "give an unstructured, structured or rectilinear grid, or structured points";
+            return Err(ReadReason::unsupported(what, remedy));
         }
         Ok((file, kind, time))
     }
 
-    fn rest(&self) -> &'a [u8] {
-        self.bytes.get(self.at..).unwrap_or_default()
-    }
-
-    /// The next word, if there is one.
-    fn next_word(&mut self) -> Result<Option<&'a str>, ReadReason> {
-        let blank = self.rest().iter().take_while(|c| c.is_ascii_whitespace()).count();
-        self.at += blank;
-        if self.rest().is_empty() { Ok(None) } else { self.word().map(Some) }
-    }
-
-    fn word(&mut self) -> Result<&'a str, ReadReason> {
-        let rest = self.rest();
-        let start = rest.iter().position(|c| !c.is_ascii_whitespace()).unwrap_or(rest.len());
-        let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
-        self.at += start + length;
-        if length == 0 {
-            return Err(ReadReason::Truncated { needed: 1, found: 0 });
-        }
-        text(&rest[start..start + length])
-    }
-
-    /// The rest of the line, without its end.
-    fn line(&mut self) -> Result<&'a str, ReadReason> {
-        let rest = self.rest();
-        let length = rest.iter().position(|c| *c == b'\n').unwrap_or(rest.len());
-        self.at += (length + 1).min(rest.len());
-        text(&rest[..length])
-    }
-
-    fn skip_line(&mut self) {
-        let rest = self.rest();
-        let length = rest.iter().position(|c| *c == b'\n').map_or(rest.len(), |i| i + 1);
-        self.at += length;
-    }
-
     fn count(&mut self) -> Result<usize, ReadReason> {
-        let word = self.word()?;
-        word.parse().map_err(|_| ReadReason::Syntax(format!("\"{}\" is not a count", shortened(word))))
+        let word = self.words.word()?;
+        word.parse().map_err(|_| ReadReason::Syntax(format!("\"{}\" is not a count", shown(word))))
     }
 
     fn three<T: std::str::FromStr>(&mut self) -> Result<[T; 3], ReadReason> {
-        let words = [self.word()?, self.word()?, self.word()?];
+        let words = [self.words.word()?, self.words.word()?, self.words.word()?];
         let numbers: Result<Vec<T>, _> = words.iter().map(|w| w.parse()).collect();
         let numbers = numbers.ok().and_then(|n| n.try_into().ok());
         numbers.ok_or_else(|| ReadReason::Syntax("three numbers expected".into()))
     }
 
-    /// The next `count` bytes.
-    fn take(&mut self, count: Option<usize>) -> Result<&'a [u8], ReadReason> {
-        let rest = self.rest();
-        let needed = count.unwrap_or(usize::MAX);
-        let found = rest.len() as u64;
-        let taken = rest.get(..needed).ok_or(ReadReason::Truncated { needed: needed as u64, found })?;
-        self.at += needed;
-        Ok(taken)
-    }
-
     /// `count` numbers of text.
-    fn words<T>(
+    fn numbers<T>(
         &mut self,
         count: usize,
         parse: impl Fn(&str) -> Result<T, ReadReason>,
     ) -> Result<Vec<T>, ReadReason> {
-        // A number and the space after it are two bytes, so the capacity is bounded by what is there.
-        let mut values = Vec::with_capacity(count.min(self.rest().len() / 2 + 1));
+        let mut values = Vec::with_capacity(self.words.capacity(count));
         for found in 0..count {
-            let Some(word) = self.next_word()? else {
+            let Some(word) = self.words.next_word()? else {
                 return Err(ReadReason::Truncated { needed: count as u64, found: found as u64 });
             };
             values.push(parse(word)?);
@@ -236,54 +181,41 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
-    /// Steps over `count` numbers of text.
-    fn skip_words(&mut self, count: usize) -> Result<(), ReadReason> {
-        for found in 0..count {
-            if self.next_word()?.is_none() {
-                return Err(ReadReason::Truncated { needed: count as u64, found: found as u64 });
-            }
-        }
-        Ok(())
-    }
-
     /// The numbers of an array whose announcing line was read but for its end; `None` for text.
     fn floats(&mut self, count: Option<usize>, kind: Kind) -> Result<Option<Vec<f64>>, ReadReason> {
         let count =
-            count.ok_or(ReadReason::Truncated { needed: u64::MAX, found: self.rest().len() as u64 })?;
-        self.skip_line();
+            count.ok_or(ReadReason::Truncated { needed: u64::MAX, found: self.words.rest().len() as u64 })?;
+        self.words.skip_line();
         match kind {
             Kind::Number(number) if self.binary => {
-                let bytes = self.take(count.checked_mul(number.size()))?;
+                let bytes = self.words.take(count.checked_mul(number.size()))?;
                 Ok(Some(if self.skims { Vec::new() } else { number.floats(bytes, true) }))
             }
-            Kind::Bit if self.binary && self.skims => {
-                self.take(Some(count.div_ceil(8)))?;
-                Ok(Some(Vec::new()))
-            }
-            Kind::Number(_) | Kind::Bit if self.skims => {
-                self.skip_words(count)?;
-                Ok(Some(Vec::new()))
-            }
-            Kind::Number(number) => self.words(count, |w| number.parse_float(w)).map(Some),
             Kind::Bit if self.binary => {
-                let bytes = self.take(Some(count.div_ceil(8)))?;
+                let bytes = self.words.take(Some(count.div_ceil(8)))?;
+                let count = if self.skims { 0 } else { count };
                 Ok(Some((0..count).map(|i| f64::from(bytes[i / 8] >> (7 - i % 8) & 1)).collect()))
             }
-            Kind::Bit => self.words(count, |w| NumberType::U8.parse_float(w)).map(Some),
+            Kind::Number(_) | Kind::Bit if self.skims => {
+                self.numbers(count, |_| Ok(()))?;
+                Ok(Some(Vec::new()))
+            }
+            Kind::Number(number) => self.numbers(count, |w| number.parse_float(w)).map(Some),
+            Kind::Bit => self.numbers(count, |w| NumberType::U8.parse_float(w)).map(Some),
             Kind::Text => self.skip_texts(count).map(|()| None),
         }
     }
 
     fn integers(&mut self, count: usize, number: NumberType) -> Result<Vec<i64>, ReadReason> {
-        self.skip_line();
+        self.words.skip_line();
         if self.binary {
-            let bytes = self.take(count.checked_mul(number.size()))?;
+            let bytes = self.words.take(count.checked_mul(number.size()))?;
             if self.skims { Ok(Vec::new()) } else { number.integers(bytes, true) }
         } else if self.skims {
-            self.skip_words(count)?;
+            self.numbers(count, |_| Ok(()))?;
             Ok(Vec::new())
         } else {
-            self.words(count, |w| number.parse_integer(w))
+            self.numbers(count, |w| number.parse_integer(w))
         }
     }
 
@@ -291,16 +223,16 @@ impl<'a> Reader<'a> {
     /// the length itself is.
     fn skip_texts(&mut self, count: usize) -> Result<(), ReadReason> {
         for found in 0..count {
-            let Some(first) = self.rest().first() else {
+            let Some(first) = self.words.rest().first() else {
                 return Err(ReadReason::Truncated { needed: count as u64, found: found as u64 });
             };
             if !self.binary {
-                self.skip_line();
+                self.words.skip_line();
                 continue;
             }
-            let header = self.take(Some(8 >> (first >> 6)))?;
+            let header = self.words.take(Some(8 >> (first >> 6)))?;
             let length = header[1..].iter().fold(u64::from(header[0] & 0x3f), |n, b| n << 8 | u64::from(*b));
-            self.take(usize::try_from(length).ok())?;
+            self.words.take(usize::try_from(length).ok())?;
         }
         Ok(())
     }
@@ -309,11 +241,9 @@ impl<'a> Reader<'a> {
     fn metadata(&mut self) -> Option<String> {
         let mut unit = None;
         let mut is_unit = false;
-        self.skip_line();
-        while !self.rest().is_empty() {
-            let start = self.at;
-            self.skip_line();
-            let line = self.bytes[start..self.at].trim_ascii();
+        self.words.skip_line();
+        while !self.words.rest().is_empty() {
+            let line = self.words.line().trim_ascii();
             if line.is_empty() {
                 break;
             }
@@ -330,22 +260,22 @@ impl<'a> Reader<'a> {
     /// A FIELD block, its keyword read: `take` gets each array, of which the numbers come next, and the unit of the last one when it is
     /// known.
     fn field_block(&mut self, take: TakeArray<'_, 'a>) -> Result<(), ReadReason> {
-        self.word()?;
+        self.words.word()?;
         let arrays = self.count()?;
         for _ in 0..arrays {
-            let mut name = self.word()?;
+            let mut name = self.words.word()?;
             if name.eq_ignore_ascii_case("metadata") {
                 // What is known of the array before this one.
                 let unit = self.metadata().unwrap_or_default();
                 take(self, Taken::Unit(&unit))?;
-                name = self.word()?;
+                name = self.words.word()?;
             }
             if name == "NULL_ARRAY" {
-                self.skip_line();
+                self.words.skip_line();
                 continue;
             }
             let (components, tuples) = (self.count()?, self.count()?);
-            let kind = Kind::named(self.word()?)?;
+            let kind = Kind::named(self.words.word()?)?;
             take(self, Taken::Array(&ArrayHead { name: decoded_name(name), components, tuples, kind }))?;
         }
         Ok(())
@@ -482,6 +412,15 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// Reads all sections.
+    fn read(&mut self, file: &mut Reader<'_>) -> Result<(), ReadError> {
+        while let Some(keyword) = file.words.next_word().at(|| "body".into())? {
+            let keyword = keyword.to_ascii_lowercase();
+            self.section(file, &keyword).at(|| shown(&keyword).to_ascii_uppercase())?;
+        }
+        Ok(())
+    }
+
     /// Reads the section that `keyword` announces.
     fn section(&mut self, file: &mut Reader<'_>, keyword: &str) -> Result<(), ReadReason> {
         if keyword != "metadata" {
@@ -491,7 +430,7 @@ impl<'a> Body<'a> {
             "points" => {
                 let count = file.count()?;
                 self.points = count;
-                let kind = Kind::named(file.word()?)?;
+                let kind = Kind::named(file.words.word()?)?;
                 let values = file.floats(count.checked_mul(3), kind)?;
                 let values = values.ok_or_else(|| ReadReason::Syntax("points made of text".into()))?;
                 self.positions = Some(points_from(&values));
@@ -506,7 +445,7 @@ impl<'a> Body<'a> {
             }
             "x_coordinates" | "y_coordinates" | "z_coordinates" => {
                 let count = file.count()?;
-                let kind = Kind::named(file.word()?)?;
+                let kind = Kind::named(file.words.word()?)?;
                 let values = file.floats(Some(count), kind)?;
                 let values = values.ok_or_else(|| ReadReason::Syntax("coordinates made of text".into()))?;
                 let axis = usize::from(keyword.as_bytes()[0] - b'x');
@@ -558,11 +497,11 @@ impl<'a> Body<'a> {
         }
         self.cells = Some(count.saturating_sub(1));
         for (expected, length) in [("offsets", count), ("connectivity", size)] {
-            let word = file.word()?;
+            let word = file.words.word()?;
             if !word.eq_ignore_ascii_case(expected) {
                 return Err(instead(word, &expected.to_ascii_uppercase()));
             }
-            let Kind::Number(number) = Kind::named(file.word()?)? else {
+            let Kind::Number(number) = Kind::named(file.words.word()?)? else {
                 return Err(ReadReason::Syntax("indices that are not numbers".into()));
             };
             let list = file.integers(length, number)?;
@@ -584,18 +523,18 @@ impl<'a> Body<'a> {
             "global_ids" | "pedigree_ids" | "edge_flags" => Some(1),
             "scalars" | "color_scalars" | "texture_coordinates" | "lookup_table" => None,
             other => {
-                return Err(ReadReason::Syntax(format!("keyword \"{}\" is not known", shortened(other))));
+                return Err(ReadReason::Syntax(format!("keyword \"{}\" is not known", shown(other))));
             }
         };
-        let name = decoded_name(file.word()?);
+        let name = decoded_name(file.words.word()?);
         let bytes_or_floats = Kind::Number(if file.binary { NumberType::U8 } else { NumberType::F32 });
         let (components, tuples, kind) = match (keyword, fixed) {
-            (_, Some(components)) => (components, owned, Kind::named(file.word()?)?),
+            (_, Some(components)) => (components, owned, Kind::named(file.words.word()?)?),
             ("color_scalars", _) => (file.count()?, owned, bytes_or_floats),
             ("lookup_table", _) => (4, file.count()?, bytes_or_floats),
-            ("texture_coordinates", _) => (file.count()?, owned, Kind::named(file.word()?)?),
+            ("texture_coordinates", _) => (file.count()?, owned, Kind::named(file.words.word()?)?),
             _ => {
-                let kind = Kind::named(file.word()?)?;
+                let kind = Kind::named(file.words.word()?)?;
                 (scalar_components(file)?, owned, kind)
             }
         };
@@ -706,7 +645,7 @@ impl<'a> Body<'a> {
     fn unstructured(mut self, file: &Reader<'_>) -> Result<TetMesh, ReadError> {
         let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
         let positions = self.take_positions()?;
-        expect("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
+        expect_count("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
         if cells > 0 && cells::are_points(&self.types) {
             return self.mesh(positions, None);
         }
@@ -717,7 +656,7 @@ impl<'a> Body<'a> {
         cells::resolve_orders(&mut self.types, &ends);
         cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
         let length = cells::checked_ends(&self.types, &ends).at(|| "CELLS".into())?;
-        expect("numbers in the cell list", length, self.connectivity.len()).at(|| "CELLS".into())?;
+        expect_count("numbers in the cell list", length, self.connectivity.len()).at(|| "CELLS".into())?;
         let (types, connectivity) = (std::mem::take(&mut self.types), std::mem::take(&mut self.connectivity));
         let mut listed = CellList { types, ends, connectivity };
         listed.order_as_before_9(swapped);
@@ -743,7 +682,7 @@ impl<'a> Body<'a> {
             return Err(ReadReason::Syntax("the offsets do not start at 0".into()));
         }
         ends.drain(..ends.len().min(1));
-        expect("offsets of cells", cells, ends.len())?;
+        expect_count("offsets of cells", cells, ends.len())?;
         Ok(ends)
     }
 
@@ -766,7 +705,7 @@ impl<'a> Body<'a> {
             ends.push(connectivity.len() as i64);
             rest = after;
         }
-        expect("numbers in the cell list", counted.len() - rest.len(), counted.len())?;
+        expect_count("numbers in the cell list", counted.len() - rest.len(), counted.len())?;
         self.connectivity = connectivity;
         Ok(ends)
     }
@@ -806,7 +745,7 @@ impl<'a> Body<'a> {
         let dims = grid::checked_dims(self.dims.unwrap_or_default()).at(|| "DIMENSIONS".to_owned())?;
         for (axis, name) in ["X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES"].into_iter().enumerate() {
             let found = self.coordinates[axis].len();
-            expect("coordinates", dims[axis] as usize, found).at(|| name.to_owned())?;
+            expect_count("coordinates", dims[axis] as usize, found).at(|| name.to_owned())?;
         }
         let coordinates = std::mem::take(&mut self.coordinates);
         self.expect_tuples(grid::cubes(dims))?;
@@ -839,37 +778,24 @@ impl<'a> Body<'a> {
 }
 
 fn check_values(fields: &Collector<'_>, expected: u64) -> Result<(), ReadReason> {
-    match fields.fields.first() {
-        Some(field) if field.values.len() as u64 != expected => {
-            let found = field.values.len() as u64;
-            Err(ReadReason::Count { what: "values a field".into(), expected, found })
-        }
-        _ => Ok(()),
-    }
+    let first = fields.fields.first();
+    first.map_or(Ok(()), |field| expect_count("values a field", expected, field.values.len()))
 }
 
 fn missing(section: &str) -> ReadReason {
     ReadReason::Missing(format!("section {section}"))
 }
 
-/// Checks a count. Counts of what was read are far from overflow.
-fn expect(what: &str, expected: usize, found: usize) -> Result<(), ReadReason> {
-    if expected == found {
-        return Ok(());
-    }
-    Err(ReadReason::Count { what: what.into(), expected: expected as u64, found: found as u64 })
-}
-
 /// The number of components after the type of SCALARS, and the LOOKUP_TABLE line, but for its end.
 fn scalar_components(file: &mut Reader<'_>) -> Result<usize, ReadReason> {
-    let line = file.line()?.trim();
+    let line = text(file.words.line())?.trim();
     let components = if line.is_empty() { Ok(1) } else { line.parse() };
     let components = components
-        .map_err(|_| ReadReason::Syntax(format!("\"{}\" is not a number of components", shortened(line))))?;
-    let word = file.word()?;
+        .map_err(|_| ReadReason::Syntax(format!("\"{}\" is not a number of components", shown(line))))?;
+    let word = file.words.word()?;
     if !word.eq_ignore_ascii_case("lookup_table") {
         return Err(instead(word, "LOOKUP_TABLE"));
     }
-    file.word()?;
+    file.words.word()?;
     Ok(components)
 }

@@ -50,7 +50,6 @@ mod error;
 mod fields;
 mod file_kind;
 mod foreign;
-#[cfg(not(target_arch = "wasm32"))]
 mod formats;
 pub mod generate;
 mod ghosts;
@@ -64,12 +63,11 @@ mod number;
 mod options;
 mod packed;
 mod payload;
-#[cfg(not(target_arch = "wasm32"))]
 mod pieces;
 mod pvd;
-#[cfg(not(target_arch = "wasm32"))]
 mod pvtu;
 mod raw;
+mod scanner;
 mod structured;
 mod surface;
 mod survey;
@@ -87,7 +85,6 @@ pub use grid::MAX_GRID_POINTS;
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
 #[doc(hidden)]
-#[cfg(not(target_arch = "wasm32"))]
 pub use pieces::{PieceCounts, Pieces};
 #[doc(hidden)]
 pub use pvd::write_pvd;
@@ -172,7 +169,6 @@ fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErr
     let mut mesh = match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(&files, path, None, &options.memory)?,
         "raw" => read_raw_by_sidecar(&files, &path.with_extension("json"), Some(path), &options.memory)?,
-        #[cfg(not(target_arch = "wasm32"))]
         "node" | "ele" => formats::tetgen::read(&files, path, options)?,
         _ => match read_ranges(path, options) {
             Some(read) => read?,
@@ -211,7 +207,7 @@ pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let alone = |file: &str| {
         let what = format!("a file that needs another (\"{file}\")");
-        Err(ReadReason::Unsupported { what, remedy: "give it by its path, with the other beside it".into() })
+        Err(ReadReason::unsupported(what, "give it by its path, with the other beside it"))
     };
     let read = read_in(name, bytes, options, &alone).map(settled)?;
     expanded(read, options).at(String::new).map_err(|e| in_file(e, name))
@@ -232,26 +228,10 @@ fn read_in(
     } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
         read_xml(start, options, beside)
     } else {
-        read_other(name, bytes, options, beside)
+        formats::read(name, bytes, options, beside)
+            .unwrap_or_else(|| Err(foreign::refused(name, bytes)).at(String::new))
     };
     result.map_err(|e| in_file(e, name))
-}
-
-/// Reads a format that is not VTK's.
-#[cfg(not(target_arch = "wasm32"))]
-fn read_other(
-    name: &str,
-    bytes: &[u8],
-    options: &ReadOptions,
-    beside: Beside<'_>,
-) -> Result<TetMesh, ReadError> {
-    formats::read(name, bytes, options, beside)
-        .unwrap_or_else(|| Err(foreign::refused(name, bytes)).at(String::new))
-}
-
-#[cfg(target_arch = "wasm32")]
-fn read_other(name: &str, bytes: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
-    Err(foreign::refused(name, bytes)).at(String::new)
 }
 
 /// Reads raw samples, given their JSON sidecar:
@@ -293,7 +273,7 @@ fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<T
     let document = xml::Document::parse(bytes)?;
     let (mut mesh, of_pieces) = match document.kind.as_str() {
         "UnstructuredGrid" => (vtu::read(&document, options)?, None),
-        "PUnstructuredGrid" => read_pieces(&document, options, beside)?,
+        "PUnstructuredGrid" => pvtu::read(&document, options, beside)?,
         kind => match kind.strip_prefix(IN_FILES).unwrap_or(kind) {
             "ImageData" => image::read(&document, options, beside)?,
             structured::RECTILINEAR | structured::CURVILINEAR => {
@@ -305,23 +285,4 @@ fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<T
     let time = document.time().or(of_pieces);
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
-}
-
-/// Reads the pieces that are listed, and their time.
-#[cfg(not(target_arch = "wasm32"))]
-fn read_pieces(
-    document: &xml::Document<'_>,
-    options: &ReadOptions,
-    beside: Beside<'_>,
-) -> Result<(TetMesh, Option<f64>), ReadError> {
-    pvtu::read(document, options, beside)
-}
-
-#[cfg(target_arch = "wasm32")]
-fn read_pieces(
-    document: &xml::Document<'_>,
-    _: &ReadOptions,
-    _: Beside<'_>,
-) -> Result<(TetMesh, Option<f64>), ReadError> {
-    Err(not_read(&document.kind)).at(String::new)
 }

@@ -1,12 +1,10 @@
 //! Documents that list files with the pieces of a grid.
 
-#[cfg(target_arch = "wasm32")]
-use crate::error::At;
-use crate::error::{ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::file_kind::without_mark;
 use crate::memory::MemoryLimit;
 use crate::options::Beside;
-#[cfg(not(target_arch = "wasm32"))]
-use crate::pvtu;
+use crate::packed;
 use crate::xml::{Document, IN_FILES, ReadFile};
 
 /// Has `read` read the document, or the files that it lists, whose bytes count in the limit; returns the time of the first one that has one.
@@ -20,27 +18,30 @@ pub(super) fn for_each_file(
         read(document)?;
         return Ok(document.time());
     }
-    read_listed(document, beside, memory, read)
-}
-
-#[cfg(not(target_arch = "wasm32"))]
-fn read_listed(
-    document: &Document<'_>,
-    beside: Beside<'_>,
-    memory: &MemoryLimit,
-    read: ReadFile<'_>,
-) -> Result<Option<f64>, ReadError> {
-    pvtu::for_each_file(document, beside, memory, read)
-}
-
-#[cfg(target_arch = "wasm32")]
-fn read_listed(
-    document: &Document<'_>,
-    _: Beside<'_>,
-    _: &MemoryLimit,
-    _: ReadFile<'_>,
-) -> Result<Option<f64>, ReadError> {
-    Err(not_read(&document.kind)).at(String::new)
+    if cfg!(target_arch = "wasm32") {
+        return Err(not_read(&document.kind)).at(String::new);
+    }
+    let mut time = None;
+    for (number, piece) in document.pieces.iter().enumerate() {
+        let missing = || ReadReason::Missing("attribute Source".into());
+        let source = piece.attributes.get("Source").ok_or_else(missing).at(|| format!("piece {number}"))?;
+        let bytes = beside(source).at(|| format!("piece {number}"))?;
+        let bytes = packed::unpacked(&bytes, memory).at(|| format!("piece {number}"))?;
+        let mut read_file = || {
+            let mut file = Document::parse(without_mark(&bytes))?;
+            source.clone_into(&mut file.name);
+            if document.kind.strip_prefix(IN_FILES) != Some(&file.kind) {
+                let what = format!("a piece of type {}", file.kind);
+                let remedy = format!("list files of type {}", document.kind.trim_start_matches(IN_FILES));
+                return Err(ReadReason::unsupported(what, remedy)).at(String::new);
+            }
+            read(&file)?;
+            Ok(file.time())
+        };
+        let of_file = read_file().map_err(|error| in_file(error, source))?;
+        time = time.or(of_file);
+    }
+    Ok(time)
 }
 
 /// Why an XML file of this type is refused.
@@ -58,5 +59,5 @@ pub(super) fn not_read(kind: &str) -> ReadReason {
             "give an UnstructuredGrid, a StructuredGrid, a RectilinearGrid or ImageData",
         ),
     };
-    ReadReason::Unsupported { what, remedy: remedy.into() }
+    ReadReason::unsupported(what, remedy)
 }

@@ -28,7 +28,6 @@ impl MemoryLimit {
     }
 
     /// The limit with nothing taken yet.
-    #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn afresh(&self) -> Self {
         self.0.as_ref().map_or_else(Self::default, |counted| Self::of(counted.most))
     }

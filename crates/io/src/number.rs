@@ -1,6 +1,6 @@
 //! Numbers as files hold them: type, byte order, text.
 
-use crate::error::ReadReason;
+use crate::error::{ReadReason, shown};
 
 /// The type of the numbers of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,7 +108,6 @@ impl NumberType {
     }
 
     /// Appends the bytes of a number.
-    #[cfg(not(target_arch = "wasm32"))]
     pub fn put(self, value: f64, big: bool, bytes: &mut Vec<u8>) {
         let start = bytes.len();
         match self {
@@ -148,8 +147,7 @@ fn not_integers() -> ReadReason {
 }
 
 fn not_a_number(text: &str) -> ReadReason {
-    let shown: String = text.chars().take(24).collect();
-    ReadReason::Syntax(format!("\"{shown}\" is not a number of the stated type"))
+    ReadReason::Syntax(format!("\"{}\" is not a number of the stated type", shown(text)))
 }
 
 /// Positions from three coordinates each.

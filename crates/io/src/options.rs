@@ -20,6 +20,17 @@ pub struct ReadOptions {
     pub memory: MemoryLimit,
 }
 
+impl ReadOptions {
+    /// Checks that a file with so many steps has the one that is wanted; without steps there is one.
+    pub(super) fn expect_step(&self, steps: usize) -> Result<(), ReadReason> {
+        let steps = steps.max(1);
+        if self.step < steps {
+            return Ok(());
+        }
+        Err(ReadReason::Missing(format!("time step {} of {steps}", self.step)))
+    }
+}
+
 /// What to do with fields at cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CellData {

@@ -40,10 +40,10 @@ pub(super) fn unpacked<'a>(bytes: &'a [u8], memory: &MemoryLimit) -> Result<File
         return unpack(bytes, MOST_BYTES, memory);
     }
     match OTHERS.iter().find(|(first, ..)| bytes.starts_with(first)) {
-        Some((_, packer, command)) => Err(ReadReason::Unsupported {
-            what: format!("a file that is packed with {packer}"),
-            remedy: format!("unpack it first (with {command}, for example); of packed files gzip is read"),
-        }),
+        Some((_, packer, command)) => Err(ReadReason::unsupported(
+            format!("a file that is packed with {packer}"),
+            format!("unpack it first (with {command}, for example); of packed files gzip is read"),
+        )),
         None => Ok(FileBytes::new(bytes, Held::default())),
     }
 }

@@ -10,7 +10,7 @@ use std::io::Read;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use base64::{Engine, alphabet};
 
-use crate::error::ReadReason;
+use crate::error::{ReadReason, expect_count};
 use crate::xz;
 
 /// How the blocks of a file are compressed.
@@ -118,7 +118,7 @@ pub(super) fn read_block<'a>(
 ) -> Result<Cow<'a, [u8]>, ReadReason> {
     let Some(compressor) = framing.compressor else {
         let stated = header_number(&mut source, framing)?;
-        expect_bytes(stated, needed)?;
+        expect_count("bytes of data", needed, stated)?;
         return source.take(needed);
     };
     let blocks = header_number(&mut source, framing)?;
@@ -127,7 +127,7 @@ pub(super) fn read_block<'a>(
     let partial = u64::from(last_size != 0);
     let full_blocks = blocks.checked_sub(partial);
     let total = full_blocks.and_then(|n| n.checked_mul(block_size)).and_then(|n| n.checked_add(last_size));
-    expect_bytes(total.unwrap_or(u64::MAX), needed)?;
+    expect_count("bytes of data", needed, total.unwrap_or(u64::MAX))?;
     let mut sizes = Vec::new();
     for _ in 0..blocks {
         sizes.push(header_number(&mut source, framing)?);
@@ -146,13 +146,6 @@ pub(super) fn read_block<'a>(
         }
     }
     Ok(Cow::Owned(data))
-}
-
-fn expect_bytes(stated: u64, needed: usize) -> Result<(), ReadReason> {
-    if stated == needed as u64 {
-        return Ok(());
-    }
-    Err(ReadReason::Count { what: "bytes of data".into(), expected: needed as u64, found: stated })
 }
 
 fn to_usize(n: u64) -> Result<usize, ReadReason> {

@@ -10,11 +10,9 @@ use quick_xml::events::Event;
 use crate::beside::{self, load};
 use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::file_kind::{lower_extension, without_gz};
-#[cfg(not(target_arch = "wasm32"))]
-use crate::formats;
 use crate::write::escaped;
 use crate::xml::Attributes;
-use crate::{MemoryLimit, packed};
+use crate::{MemoryLimit, formats, packed};
 
 /// Most bytes of a list, unpacked if it is in gzip: some hundred thousand time steps.
 const MOST_BYTES: u64 = 1 << 26;
@@ -38,7 +36,7 @@ pub struct Step {
 pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
     if lower_extension(Path::new(without_gz(&path.to_string_lossy()))) != "pvd" {
         let step = |(number, time)| Step { path: path.to_owned(), time, number };
-        let times = times_in(path)?;
+        let times = formats::times_at(path)?;
         // The reader of a file with one step knows its time.
         if times.len() < 2 {
             return Ok(vec![step((0, None))]);
@@ -55,17 +53,6 @@ pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
     };
     let steps: Result<_, ReadError> = listed.into_iter().map(step).collect();
     steps.map_err(|error| in_file(error, &path.display().to_string()))
-}
-
-/// The times of the steps in a file that may have several.
-#[cfg(not(target_arch = "wasm32"))]
-fn times_in(path: &Path) -> Result<Vec<f64>, ReadError> {
-    formats::times_at(path)
-}
-
-#[cfg(target_arch = "wasm32")]
-fn times_in(_: &Path) -> Result<Vec<f64>, ReadError> {
-    Ok(Vec::new())
 }
 
 /// Writes a list of time steps, whose files lie in the list's folder or below it; those without a time are numbered from 0.
@@ -111,15 +98,14 @@ fn parse(bytes: &[u8]) -> Result<Vec<(Option<f64>, String)>, ReadReason> {
         return Err(ReadReason::Missing("an entry <DataSet>".into()));
     }
     if listed.len() > 1 && listed.iter().any(|(time, _)| time.is_none()) {
-        let what = "a <DataSet> without a timestep among others, so a part of each time step,".into();
-        let remedy = "give each file its timestep, or merge the parts of each time step into one file".into();
-        return Err(ReadReason::Unsupported { what, remedy });
+        let what = "a <DataSet> without a timestep among others, so a part of each time step,";
+        let remedy = "give each file its timestep, or merge the parts of each time step into one file";
+        return Err(ReadReason::unsupported(what, remedy));
     }
     listed.sort_by(|a, b| a.0.unwrap_or_default().total_cmp(&b.0.unwrap_or_default()));
     if let Some(pair) = listed.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         let what = format!("time {} with more than one file", pair[0].0.unwrap_or_default());
-        let remedy = "merge the parts of each time step into one file".into();
-        return Err(ReadReason::Unsupported { what, remedy });
+        return Err(ReadReason::unsupported(what, "merge the parts of each time step into one file"));
     }
     Ok(listed)
 }
@@ -135,8 +121,7 @@ fn entry(attributes: &Attributes) -> Result<(Option<f64>, String), ReadReason> {
     let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
     if file.is_empty() || !Path::new(file).components().all(below) {
         let what = format!("a <DataSet> in another folder (\"{file}\")");
-        let remedy = "put the files beside the list or below it".into();
-        return Err(ReadReason::Unsupported { what, remedy });
+        return Err(ReadReason::unsupported(what, "put the files beside the list or below it"));
     }
     // Zero has two signs, which would not sort as equal.
     Ok((time.map(|time| time + 0.0), file.to_owned()))

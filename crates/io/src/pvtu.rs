@@ -8,11 +8,11 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::cells::Numbering;
-use crate::error::{At, ReadError, ReadReason, in_file};
-use crate::file_kind::without_mark;
+use crate::error::{At, ReadError, ReadReason};
+use crate::listed::for_each_file;
 use crate::vtu::{NumberPoints, PieceReader, first_number, join};
-use crate::xml::{Document, IN_FILES, ReadFile};
-use crate::{Beside, MemoryLimit, ReadOptions, packed};
+use crate::xml::Document;
+use crate::{Beside, ReadOptions};
 use tetralod::geom::bits_of;
 use tetralod::mesh::TetMesh;
 
@@ -25,36 +25,6 @@ pub(super) fn read(
     let mut whole = Whole::default();
     let time = for_each_file(document, beside, &options.memory, &mut |file| whole.append(file, options))?;
     Ok((whole.mesh, time))
-}
-
-/// Has `read` read the files that are listed, one after the other; returns the time of the first one that has one.
-pub(super) fn for_each_file(
-    document: &Document<'_>,
-    beside: Beside<'_>,
-    memory: &MemoryLimit,
-    read: ReadFile<'_>,
-) -> Result<Option<f64>, ReadError> {
-    let mut time = None;
-    for (number, piece) in document.pieces.iter().enumerate() {
-        let missing = || ReadReason::Missing("attribute Source".into());
-        let source = piece.attributes.get("Source").ok_or_else(missing).at(|| format!("piece {number}"))?;
-        let bytes = beside(source).at(|| format!("piece {number}"))?;
-        let bytes = packed::unpacked(&bytes, memory).at(|| format!("piece {number}"))?;
-        let mut read_file = || {
-            let mut file = Document::parse(without_mark(&bytes))?;
-            source.clone_into(&mut file.name);
-            if document.kind.strip_prefix(IN_FILES) != Some(&file.kind) {
-                let what = format!("a piece of type {}", file.kind);
-                let remedy = format!("list files of type {}", document.kind.trim_start_matches(IN_FILES));
-                return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
-            }
-            read(&file)?;
-            Ok(file.time())
-        };
-        let of_file = read_file().map_err(|error| in_file(error, source))?;
-        time = time.or(of_file);
-    }
-    Ok(time)
 }
 
 /// What was read of the pieces so far.

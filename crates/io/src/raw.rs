@@ -7,7 +7,7 @@
 
 use serde_json::Value;
 
-use crate::error::ReadReason;
+use crate::error::{ReadReason, expect_count};
 use crate::grid::{self, GridValues};
 use crate::number::NumberType;
 use crate::{MemoryLimit, Survey};
@@ -40,8 +40,8 @@ impl Sidecar {
         let order = text("order")?.unwrap_or("x fastest");
         if !order.starts_with("x fastest") {
             let what = format!("the order \"{order}\"");
-            let remedy = "write the samples x fastest, then y, then z".into();
-            return Err(ReadReason::Unsupported { what, remedy });
+            let remedy = "write the samples x fastest, then y, then z";
+            return Err(ReadReason::unsupported(what, remedy));
         }
         let dims =
             three(&value, "dims", Value::as_u64)?.ok_or_else(|| ReadReason::Missing("\"dims\"".into()))?;
@@ -60,8 +60,8 @@ impl Sidecar {
         };
         let file = text("file")?.map(str::to_owned);
         if file.as_ref().is_some_and(|f| f.contains(['/', '\\', ':']) || f == "..") {
-            let what = "a \"file\" in another folder".into();
-            return Err(ReadReason::Unsupported { what, remedy: "put both files side by side".into() });
+            let what = "a \"file\" in another folder";
+            return Err(ReadReason::unsupported(what, "put both files side by side"));
         }
         let field = text("field")?.unwrap_or("value").to_owned();
         let unit = text("unit")?.unwrap_or_default().to_owned();
@@ -78,14 +78,7 @@ impl Sidecar {
     /// The mesh of these samples.
     pub fn mesh(&self, samples: &[u8], memory: &MemoryLimit) -> Result<TetMesh, ReadReason> {
         let points: u64 = self.grid.dims.iter().map(|d| u64::from(*d)).product();
-        let expected = points * self.number.size() as u64;
-        if samples.len() as u64 != expected {
-            return Err(ReadReason::Count {
-                what: "bytes of samples".into(),
-                expected,
-                found: samples.len() as u64,
-            });
-        }
+        expect_count("bytes of samples", points * self.number.size() as u64, samples.len())?;
         memory.take(8 * points)?;
         let values = self.number.floats(samples, self.big);
         let field = Field {
@@ -102,10 +95,10 @@ fn check_keys(sidecar: &Value) -> Result<(), ReadReason> {
     let is_known = |key: &str| KEYS.contains(&key) || REMARKS.contains(&key);
     let Some(key) = members.keys().find(|key| !is_known(key)) else { return Ok(()) };
     let key: String = key.chars().take(48).collect();
-    Err(ReadReason::Unsupported {
-        what: format!("the key \"{key}\""),
-        remedy: format!("leave it out; known are {} and the remarks {}", KEYS.join(", "), REMARKS.join(", ")),
-    })
+    Err(ReadReason::unsupported(
+        format!("the key \"{key}\""),
+        format!("leave it out; known are {} and the remarks {}", KEYS.join(", "), REMARKS.join(", ")),
+    ))
 }
 
 /// A text of the sidecar, if the key is there.

@@ -4,10 +4,9 @@ use crate::contents::Survey;
 use crate::error::{At, ReadError, in_file};
 use crate::file_kind::without_mark;
 use crate::listed::not_read;
-#[cfg(not(target_arch = "wasm32"))]
-use crate::{CellData, ReadOptions, formats};
-use crate::{MemoryLimit, foreign, image, legacy, packed, raw, structured, vtu, xml};
-#[cfg(not(target_arch = "wasm32"))]
+use crate::{
+    CellData, MemoryLimit, ReadOptions, foreign, formats, image, legacy, packed, raw, structured, vtu, xml,
+};
 use tetralod::mesh::Field;
 
 /// Says what is in the bytes of a file; `name` is used in errors alone. No array is decoded, so this takes little memory
@@ -31,7 +30,6 @@ pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
 }
 
 /// Says what a file of a format contains that is not VTK's: these are read for it.
-#[cfg(not(target_arch = "wasm32"))]
 fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
     let Some(format) = formats::name(bytes) else {
         return Err(foreign::refused(name, bytes)).at(String::new);
@@ -48,11 +46,6 @@ fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
         fields: described(mesh.fields).collect(),
         cell_fields: described(mesh.cell_fields).collect(),
     })
-}
-
-#[cfg(target_arch = "wasm32")]
-fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
-    Err(foreign::refused(name, bytes)).at(String::new)
 }
 
 /// Says what the JSON sidecar of raw samples describes.
@@ -79,7 +72,7 @@ pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
         return Some("vtk");
     }
     if !start.starts_with(b"<") {
-        return format_of_other(bytes);
+        return formats::name(bytes);
     }
     // The root element names the type within its first words.
     let head =
@@ -97,16 +90,6 @@ pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
         ("PStructuredGrid", "pvts"),
     ];
     formats.iter().find(|(name, _)| *name == kind).map(|(_, format)| *format)
-}
-
-#[cfg(not(target_arch = "wasm32"))]
-fn format_of_other(bytes: &[u8]) -> Option<&'static str> {
-    formats::name(bytes)
-}
-
-#[cfg(target_arch = "wasm32")]
-fn format_of_other(_: &[u8]) -> Option<&'static str> {
-    None
 }
 
 fn survey_xml(bytes: &[u8]) -> Result<Survey, ReadError> {

@@ -2,7 +2,7 @@
 //! points without tetrahedra.
 
 use crate::cells::{CellList, Numbering};
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
 use crate::number::points_from;
@@ -156,10 +156,7 @@ impl PieceReader<'_, '_> {
             return Err(ReadReason::Missing("the array of <Points>".into())).at(|| self.place());
         };
         let components = array.components().at(|| array.place())?;
-        if components != 3 {
-            let (what, found) = ("components of the points".into(), components as u64);
-            return Err(ReadReason::Count { what, expected: 3, found }).at(|| array.place());
-        }
+        expect_count("components of the points", 3_u64, components).at(|| array.place())?;
         self.options.memory.take((points as u64).saturating_mul(24)).at(|| array.place())?;
         self.expect_numbers(points.saturating_mul(3)).at(|| array.place())?;
         let values = self.document.floats(array, points, 3).at(|| array.place())?;

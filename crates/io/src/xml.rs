@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::number::NumberType;
 use crate::payload;
 use crate::payload::{Compressor, Framing, Source};
@@ -246,10 +246,7 @@ impl<'a> Document<'a> {
     ) -> Result<Vec<T>, ReadReason> {
         let number = array.number_type().ok_or_else(|| {
             let kind = array.attributes.get("type").unwrap_or_default();
-            ReadReason::Unsupported {
-                what: format!("data of type \"{kind}\""),
-                remedy: "use a numeric type".into(),
-            }
+            ReadReason::unsupported(format!("data of type \"{kind}\""), "use a numeric type")
         })?;
         let needed = tuples.checked_mul(components);
         let bytes = needed.and_then(|n| n.checked_mul(number.size()));
@@ -301,10 +298,7 @@ fn parse_text<T>(
     parse: impl Fn(&str) -> Result<T, ReadReason>,
 ) -> Result<Vec<T>, ReadReason> {
     let values: Vec<T> = text.split_ascii_whitespace().map(parse).collect::<Result<_, _>>()?;
-    if values.len() != needed {
-        let (expected, found) = (needed as u64, values.len() as u64);
-        return Err(ReadReason::Count { what: "numbers".into(), expected, found });
-    }
+    expect_count("numbers", needed, values.len())?;
     Ok(values)
 }
 
@@ -457,8 +451,8 @@ impl<'a> Parser<'a> {
         let (pieces, field_data, version) = (self.pieces, self.field_data, version(&file));
         if version[0] > LAST_VERSION {
             let what = format!("version {}.{} of the format", version[0], version[1]);
-            let remedy = "have it written by VTK 9".into();
-            return Err(ReadReason::Unsupported { what, remedy }).at(|| "<VTKFile>".into());
+            let remedy = "have it written by VTK 9";
+            return Err(ReadReason::unsupported(what, remedy)).at(|| "<VTKFile>".into());
         }
         Ok(Document { kind, version, name: String::new(), dataset, pieces, field_data, framing, appended })
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::cells::{self, CellList, Numbering};
-use crate::error::ReadReason;
+use crate::error::{ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::number::points_from;
 use crate::{CellData, ReadOptions};
@@ -60,19 +60,8 @@ impl<'a> Draft<'a> {
         self.list.ends.push(self.list.connectivity.len() as i64);
     }
 
-    /// Keeps an array with values at points.
-    pub fn at_points(
-        &mut self,
-        name: &str,
-        components: usize,
-        values: Vec<f64>,
-        integer: bool,
-    ) -> Result<(), ReadReason> {
-        self.read_at_points(name, components, integer, || Ok(values))
-    }
-
     /// Keeps an array with values at points, which are read only if they are wanted.
-    pub fn read_at_points(
+    pub fn at_points(
         &mut self,
         name: &str,
         components: usize,
@@ -85,19 +74,8 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// Keeps an array with values at cells, if that is wanted.
-    pub fn at_cells(
-        &mut self,
-        name: &str,
-        components: usize,
-        values: Vec<f64>,
-        integer: bool,
-    ) -> Result<(), ReadReason> {
-        self.read_at_cells(name, components, integer, || Ok(values))
-    }
-
     /// Keeps an array with values at cells, which are read only if they are wanted.
-    pub fn read_at_cells(
+    pub fn at_cells(
         &mut self,
         name: &str,
         components: usize,
@@ -128,22 +106,16 @@ impl<'a> Draft<'a> {
         if self.list.types.is_empty() && has_flat {
             return Err(ReadReason::CellTypes(self.flat.into_iter().collect()));
         }
-        let others = [self.fields.others, std::mem::take(&mut self.cell_fields.others)];
-        let [other_fields, other_cell_fields] = others;
-        self.input.other_fields = other_fields;
+        self.input.other_fields = self.fields.others;
         if self.list.types.is_empty() {
             check_finite(&positions, &fields, &|| None)?;
-            return Ok(TetMesh {
-                positions,
-                fields,
-                input: self.input,
-                notes: self.notes,
-                ..TetMesh::default()
-            });
+            let Self { input, notes, .. } = self;
+            return Ok(TetMesh { positions, fields, input, notes, ..TetMesh::default() });
         }
         if !fields.is_empty() {
             self.cell_fields.drop_first();
         }
+        self.input.other_cell_fields = self.cell_fields.others;
         check_finite(&positions, &fields, &|| Some(self.list.used(positions.len())))?;
         let cells = self.list.types.len();
         cells::checked_ends(&self.list.types, &self.list.ends)?;
@@ -152,20 +124,16 @@ impl<'a> Draft<'a> {
         let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
         check_finite_cells(&cell_fields, |_| true)?;
         split.spread(&mut cell_fields);
-        let mut input = MeshInput { other_cell_fields, ..self.input };
-        input.append(split.input);
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input, notes: self.notes })
+        self.input.append(split.input);
+        let Self { input, notes, .. } = self;
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input, notes })
     }
 }
 
 /// Checks that fields have as many values as there are points or cells, or none.
 fn expect_values(fields: Vec<Field>, expected: usize) -> Result<Vec<Field>, ReadReason> {
-    match fields.iter().find(|field| !field.values.is_empty() && field.values.len() != expected) {
-        Some(Field { name, values, .. }) => Err(ReadReason::Count {
-            what: format!("values of \"{name}\""),
-            expected: expected as u64,
-            found: values.len() as u64,
-        }),
-        None => Ok(fields),
+    for Field { name, values, .. } in fields.iter().filter(|field| !field.values.is_empty()) {
+        expect_count(format!("values of \"{name}\""), expected, values.len())?;
     }
+    Ok(fields)
 }

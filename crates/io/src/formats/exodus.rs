@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use netcdf_reader::{NcFile, NcGroup, NcSliceInfo, NcSliceInfoElem, NcVariable};
 
 use crate::ReadOptions;
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::formats::draft::Draft;
 use crate::formats::exodus_cells::{Element, element};
 use crate::formats::hdf5_values::{checked_times, netcdf_reason};
@@ -39,10 +39,7 @@ pub(super) fn times(file: &NcFile) -> Result<Vec<f64>, ReadError> {
 /// Reads a mesh.
 pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let times = times(file)?;
-    if options.step >= times.len().max(1) {
-        let what = format!("time step {} of {}", options.step, times.len().max(1));
-        return Err(ReadReason::Missing(what)).at(String::new);
-    }
+    options.expect_step(times.len()).at(String::new)?;
     let reader = Reader::new(file, options.step as u64).at(String::new)?;
     let mut draft = Draft::new(options);
     draft.coordinates = reader.coordinates().at(|| "coordinates".into())?;
@@ -52,7 +49,7 @@ pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, Read
         reader.variables_at_elements(&blocks, &mut draft)?;
     }
     let numbers = reader.numbers_of_blocks(&blocks).at(|| "eb_prop1".into())?;
-    draft.at_cells("block", 1, numbers, true).at(|| "eb_prop1".into())?;
+    draft.at_cells("block", 1, true, || Ok(numbers)).at(|| "eb_prop1".into())?;
     let mut mesh = draft.finish().at(|| "element blocks".into())?;
     let time = times.get(options.step).copied();
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
@@ -78,9 +75,11 @@ impl<'a> Reader<'a> {
 
     fn size(&self, name: &str) -> Result<u64, ReadReason> {
         let dimension = self.root.dimension(name);
-        let missing = || ReadReason::Unsupported {
-            what: format!("a file in HDF5 or netCDF without \"{name}\", so neither VTKHDF nor Exodus,"),
-            remedy: "give one of these, or save it as .vtu".into(),
+        let missing = || {
+            ReadReason::unsupported(
+                format!("a file in HDF5 or netCDF without \"{name}\", so neither VTKHDF nor Exodus,"),
+                "give one of these, or save it as .vtu",
+            )
         };
         dimension.map(|dimension| dimension.size).ok_or_else(missing)
     }
@@ -107,7 +106,7 @@ impl<'a> Reader<'a> {
         let axes = self.size("num_dim")?;
         if axes != 3 {
             let what = format!("a mesh in {axes} dimensions");
-            return Err(ReadReason::Unsupported { what, remedy: "give a mesh of volumes".into() });
+            return Err(ReadReason::unsupported(what, "give a mesh of volumes"));
         }
         // Old files have one array.
         let mut along = Vec::new();
@@ -116,10 +115,7 @@ impl<'a> Reader<'a> {
             along.push(if is_old { self.values("coord", &[axis])? } else { self.values(name, &[])? });
         }
         let points = along[0].len();
-        if let Some(other) = along.iter().find(|axis| axis.len() != points) {
-            let what = "coordinates along an axis".into();
-            return Err(ReadReason::Count { what, expected: points as u64, found: other.len() as u64 });
-        }
+        along.iter().try_for_each(|axis| expect_count("coordinates along an axis", points, axis.len()))?;
         Ok((0..points).flat_map(|i| along.iter().map(move |axis| axis[i])).collect())
     }
 
@@ -152,11 +148,11 @@ impl<'a> Reader<'a> {
         let kind = kind.trim_end_matches('\0');
         let shape = variable.shape();
         let points = shape.get(1).map_or(1, |points| usize::try_from(*points).unwrap_or(usize::MAX));
-        let unknown = || ReadReason::Unsupported {
-            what: format!("a block of elements \"{kind}\" of {points} points"),
-            remedy:
-                "save the mesh with tetrahedra, hexahedra, wedges and pyramids of the first or second order"
-                    .into(),
+        let unknown = || {
+            ReadReason::unsupported(
+                format!("a block of elements \"{kind}\" of {points} points"),
+                "save the mesh with tetrahedra, hexahedra, wedges and pyramids of the first or second order",
+            )
         };
         let Element::Solid(cell, order) = element(kind, points).ok_or_else(unknown)? else { return Ok(None) };
         let list = self.values(name, &[])?;
@@ -199,7 +195,7 @@ impl<'a> Reader<'a> {
                 };
                 expect(points, values)
             };
-            draft.read_at_points(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
+            draft.at_points(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
         }
         Ok(())
     }
@@ -221,7 +217,7 @@ impl<'a> Reader<'a> {
                 }
                 Ok(values)
             };
-            draft.read_at_cells(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
+            draft.at_cells(&name, parts.len(), false, || interleaved(&parts, read)).at(place)?;
         }
         Ok(())
     }
@@ -231,11 +227,8 @@ impl<'a> Reader<'a> {
 const POLYHEDRON: i64 = 42;
 
 fn expect(expected: usize, values: Vec<f64>) -> Result<Vec<f64>, ReadReason> {
-    if values.len() == expected {
-        return Ok(values);
-    }
-    let (expected, found) = (expected as u64, values.len() as u64);
-    Err(ReadReason::Count { what: "values".into(), expected, found })
+    expect_count("values", expected, values.len())?;
+    Ok(values)
 }
 
 /// The values of the parts of a vector, of one tuple behind the other.

@@ -9,13 +9,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use crate::error::{At, ReadError, ReadReason};
-use crate::formats::gmsh_layout::{Layout, Version};
+use crate::error::{At, ReadError, ReadReason, shown};
+use crate::formats::gmsh_layout::{Layout, Numbers, Version};
 use crate::formats::gmsh_mesh::Mesh;
 use crate::formats::gmsh_sections::{read_elements, read_entities, read_nodes, read_partitions};
 use crate::formats::gmsh_views::{self, At as ViewAt, Head, SECTIONS, Steps, View};
-use crate::formats::scanner::Scanner;
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 use crate::{CellData, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -44,7 +44,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     let in_binary = mesh.layout.is_some_and(|layout| layout.binary);
     done.at(|| {
         let place = if in_binary { file.byte_number() } else { file.line_number() };
-        format!("{}, {place}", section.chars().take(24).collect::<String>())
+        format!("{}, {place}", shown(&section))
     })?;
     mesh.finish()
 }
@@ -83,28 +83,26 @@ const HARMLESS: [&str; 7] = [
 impl Mesh<'_> {
     fn section(&mut self, file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
         let missing = || ReadReason::Missing("section $MeshFormat".into());
+        let numbers = self.layout.map(|layout| Numbers { file: &mut *file, layout });
         match name {
             "$MeshFormat" => self.layout = Some(read_format(file)?),
             // These sections are of version 1 alone.
             "$NOD" | "$ELM" => return Err(unsupported("1")),
-            "$Entities" => read_entities(self, file, self.layout.ok_or_else(missing)?)?,
-            "$Nodes" => read_nodes(self, file, self.layout.ok_or_else(missing)?)?,
-            "$Elements" => read_elements(self, file, self.layout.ok_or_else(missing)?)?,
+            "$Entities" => read_entities(self, &mut numbers.ok_or_else(missing)?)?,
+            "$Nodes" => read_nodes(self, &mut numbers.ok_or_else(missing)?)?,
+            "$Elements" => read_elements(self, &mut numbers.ok_or_else(missing)?)?,
             "$PartitionedEntities"
                 if self.layout.is_some_and(|layout| layout.version == Version::FourOne) =>
             {
-                read_partitions(self, file, self.layout.ok_or_else(missing)?)?;
+                read_partitions(self, &mut numbers.ok_or_else(missing)?)?;
             }
             _ if name.starts_with('$') => {
                 let Some((_, at)) = SECTIONS.iter().find(|(known, _)| *known == name) else {
                     return self.skip(file, name);
                 };
-                return self.view(file, self.layout.ok_or_else(missing)?, *at, name);
+                return self.view(&mut numbers.ok_or_else(missing)?, *at, name);
             }
-            other => {
-                let shown: String = other.chars().take(24).collect();
-                return Err(ReadReason::Syntax(format!("\"{shown}\" instead of a section")));
-            }
+            other => return Err(ReadReason::Syntax(format!("\"{}\" instead of a section", shown(other)))),
         }
         expect_end(file, name)
     }
@@ -119,24 +117,16 @@ impl Mesh<'_> {
     }
 
     /// Reads a view, if it is wanted.
-    fn view(
-        &mut self,
-        file: &mut Scanner<'_>,
-        layout: Layout,
-        at: ViewAt,
-        section: &str,
-    ) -> Result<(), ReadReason> {
-        let head = gmsh_views::read_head(file, at)?;
+    fn view(&mut self, numbers: &mut Numbers<'_, '_>, at: ViewAt, section: &str) -> Result<(), ReadReason> {
+        let head = gmsh_views::read_head(numbers.file, at)?;
         self.heads.push(head.clone());
         let is_at_cells = at == ViewAt::Elements;
-        if is_at_cells && self.draft.options.cells != CellData::Values && !layout.binary {
-            let rows = HashMap::new();
-            self.views.push(View { head, rows });
-            return skip_section(file, section);
+        if is_at_cells && self.draft.options.cells != CellData::Values && !numbers.layout.binary {
+            self.views.push(View { head, rows: HashMap::new() });
+            return skip_section(numbers.file, section);
         }
-        let view = gmsh_views::read_rows(file, layout, head)?;
-        self.views.push(view);
-        expect_end(file, section)
+        self.views.push(gmsh_views::read_rows(numbers, head)?);
+        expect_end(numbers.file, section)
     }
 
     fn finish(mut self) -> Result<TetMesh, ReadError> {
@@ -144,11 +134,8 @@ impl Mesh<'_> {
             return Err(ReadReason::Missing("section $Nodes".into())).at(String::new);
         }
         let steps = Steps::of(&self.heads);
+        self.draft.options.expect_step(steps.times.len()).at(String::new)?;
         let step = self.draft.options.step;
-        if step >= steps.times.len().max(1) {
-            let what = format!("time step {step} of {}", steps.times.len().max(1));
-            return Err(ReadReason::Missing(what)).at(String::new);
-        }
         let of_step = std::mem::take(&mut self.views).into_iter().filter(|view| steps.has(&view.head, step));
         for view in gmsh_views::merge(of_step.collect()).at(String::new)? {
             let place = || format!("view \"{}\"", view.head.name);
@@ -158,7 +145,7 @@ impl Mesh<'_> {
             [("physical", std::mem::take(&mut self.physical)), ("entity", std::mem::take(&mut self.entities))]
         {
             if !values.is_empty() {
-                self.draft.at_cells(name, 1, values, true).at(String::new)?;
+                self.draft.at_cells(name, 1, true, || Ok(values)).at(String::new)?;
             }
         }
         let skipped = self.skipped.into_iter().map(|name| format!("section {name} is left out"));
@@ -182,7 +169,7 @@ impl Mesh<'_> {
                 let cells = &self.cell_tags;
                 let values =
                     || rows_of(cells.iter().map(|tag| (*tag, true)), &view.rows, *components, "element");
-                self.draft.read_at_cells(name, *components, false, values)
+                self.draft.at_cells(name, *components, false, values)
             }
             ViewAt::ElementNodes if *has_scheme => {
                 self.draft
@@ -210,7 +197,7 @@ impl Mesh<'_> {
                 "view \"{name}\": elements have different values at {count} nodes (by up to {largest}); their mean is taken"
             ));
         }
-        self.draft.at_points(name, *components, values, false)
+        self.draft.at_points(name, *components, false, || Ok(values))
     }
 
     /// The values at nodes in their order. Nodes that no element with a volume uses need none; theirs are 0.
@@ -250,8 +237,7 @@ fn expect_end(file: &mut Scanner<'_>, name: &str) -> Result<(), ReadReason> {
     if end.eq_ignore_ascii_case(&expected) {
         return Ok(());
     }
-    let shown: String = end.chars().take(24).collect();
-    Err(ReadReason::Syntax(format!("\"{shown}\" instead of {expected}")))
+    Err(ReadReason::Syntax(format!("\"{}\" instead of {expected}", shown(end))))
 }
 
 fn read_format(file: &mut Scanner<'_>) -> Result<Layout, ReadReason> {
@@ -281,11 +267,8 @@ fn read_format(file: &mut Scanner<'_>) -> Result<Layout, ReadReason> {
 }
 
 fn unsupported(version: &str) -> ReadReason {
-    let shown: String = version.chars().take(24).collect();
-    ReadReason::Unsupported {
-        what: format!("version \"{shown}\" of Gmsh's format"),
-        remedy: "save it as version 2.2 or 4.1".into(),
-    }
+    let what = format!("version \"{}\" of Gmsh's format", shown(version));
+    ReadReason::unsupported(what, "save it as version 2.2 or 4.1")
 }
 
 /// Steps over a section, which ends with its name behind `$End`.

@@ -2,66 +2,10 @@
 
 use crate::error::ReadReason;
 use crate::formats::gmsh_cells::{Element, element};
-use crate::formats::gmsh_layout::{Layout, Version};
+use crate::formats::gmsh_layout::{Numbers, Version};
 use crate::formats::gmsh_mesh::Mesh;
-use crate::formats::scanner::Scanner;
-use crate::number::NumberType;
-
-/// Numbers of either encoding.
-struct Numbers<'s, 'a> {
-    file: &'s mut Scanner<'a>,
-    layout: Layout,
-}
 
 impl Numbers<'_, '_> {
-    /// A number that is an `int` in binary files.
-    fn int(&mut self) -> Result<i64, ReadReason> {
-        self.integer(NumberType::I32)
-    }
-
-    /// A count, or a tag of version 4.1.
-    fn wide(&mut self) -> Result<i64, ReadReason> {
-        self.integer(self.layout.wide)
-    }
-
-    fn integer(&mut self, kind: NumberType) -> Result<i64, ReadReason> {
-        if !self.layout.binary {
-            return self.file.number();
-        }
-        // One number was asked for, so there is one.
-        Ok(self.file.integers(1, kind, self.layout.big)?[0])
-    }
-
-    fn count(&mut self) -> Result<usize, ReadReason> {
-        // Version 2 writes counts as text in either encoding.
-        let has_text = self.layout.version == Version::Two;
-        let count = if has_text { self.file.number()? } else { self.wide()? };
-        usize::try_from(count).map_err(|_| ReadReason::Syntax(format!("{count} is not a count")))
-    }
-
-    fn tag(&mut self) -> Result<i64, ReadReason> {
-        if self.layout.version == Version::FourOne { self.wide() } else { self.int() }
-    }
-
-    fn float(&mut self) -> Result<f64, ReadReason> {
-        if !self.layout.binary {
-            return self.file.number();
-        }
-        Ok(self.file.floats(1, NumberType::F64, self.layout.big)?[0])
-    }
-
-    /// Steps to the first byte behind the line, if numbers are bytes.
-    fn end_line(&mut self) {
-        if self.layout.binary {
-            self.file.skip_line();
-        }
-    }
-
-    /// The number of entities of each dimension, points first.
-    fn entities(&mut self) -> Result<[usize; 4], ReadReason> {
-        Ok([self.count()?, self.count()?, self.count()?, self.count()?])
-    }
-
     /// The rest of an entity behind its tag: its place of so many numbers, its physical group, which is returned, and its boundary.
     fn rest_of_entity(&mut self, dimension: usize, place: usize) -> Result<Option<i64>, ReadReason> {
         for _ in 0..place {
@@ -83,25 +27,14 @@ impl Numbers<'_, '_> {
         }
         Ok(first)
     }
-
-    /// The dimension and the tag of a geometric entity.
-    fn entity(&mut self) -> Result<(i64, i64), ReadReason> {
-        let (first, second) = (self.int()?, self.int()?);
-        Ok(if self.layout.version == Version::Four { (second, first) } else { (first, second) })
-    }
 }
 
 /// Reads `$Entities` of versions 4.0 and 4.1 up to its end: the physical groups of volumes, the first one of each.
-pub(super) fn read_entities(
-    mesh: &mut Mesh<'_>,
-    file: &mut Scanner<'_>,
-    layout: Layout,
-) -> Result<(), ReadReason> {
-    let mut numbers = Numbers { file, layout };
+pub(super) fn read_entities(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Result<(), ReadReason> {
     numbers.end_line();
     for (dimension, count) in numbers.entities()?.into_iter().enumerate() {
         // A point has a place, all others, and the points of version 4.0, a box.
-        let floats = if dimension == 0 && layout.version == Version::FourOne { 3 } else { 6 };
+        let floats = if dimension == 0 && numbers.layout.version == Version::FourOne { 3 } else { 6 };
         for _ in 0..count {
             let tag = numbers.int()?;
             let group = numbers.rest_of_entity(dimension, floats)?;
@@ -117,12 +50,7 @@ pub(super) fn read_entities(
 }
 
 /// Reads `$PartitionedEntities` of version 4.1 up to its end: of which volume each partition is, and its physical group.
-pub(super) fn read_partitions(
-    mesh: &mut Mesh<'_>,
-    file: &mut Scanner<'_>,
-    layout: Layout,
-) -> Result<(), ReadReason> {
-    let mut numbers = Numbers { file, layout };
+pub(super) fn read_partitions(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Result<(), ReadReason> {
     numbers.end_line();
     numbers.count()?;
     for _ in 0..numbers.count()? {
@@ -144,21 +72,16 @@ pub(super) fn read_partitions(
 }
 
 /// Reads `$Nodes` up to its end.
-pub(super) fn read_nodes(
-    mesh: &mut Mesh<'_>,
-    file: &mut Scanner<'_>,
-    layout: Layout,
-) -> Result<(), ReadReason> {
-    let mut numbers = Numbers { file, layout };
-    if layout.version != Version::Two {
+pub(super) fn read_nodes(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Result<(), ReadReason> {
+    if numbers.layout.version != Version::Two {
         numbers.end_line();
-        return read_node_blocks(mesh, &mut numbers);
+        return read_node_blocks(mesh, numbers);
     }
     let count = numbers.count()?;
     numbers.end_line();
     for _ in 0..count {
         let tag = numbers.tag()?;
-        add_node(mesh, &mut numbers, tag, 0)?;
+        add_node(mesh, numbers, tag, 0)?;
     }
     Ok(())
 }
@@ -218,29 +141,24 @@ fn add_node(
 }
 
 /// Reads `$Elements` up to its end.
-pub(super) fn read_elements(
-    mesh: &mut Mesh<'_>,
-    file: &mut Scanner<'_>,
-    layout: Layout,
-) -> Result<(), ReadReason> {
-    let mut numbers = Numbers { file, layout };
-    match layout.version {
-        Version::Two if layout.binary => {
+pub(super) fn read_elements(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Result<(), ReadReason> {
+    match numbers.layout.version {
+        Version::Two if numbers.layout.binary => {
             let count = numbers.count()?;
             numbers.end_line();
             let mut done = 0;
             while done < count {
-                done += read_binary_block(mesh, &mut numbers)?;
+                done += read_binary_block(mesh, numbers)?;
             }
         }
         Version::Two => {
             for _ in 0..numbers.count()? {
-                read_element(mesh, &mut numbers)?;
+                read_element(mesh, numbers)?;
             }
         }
         Version::Four | Version::FourOne => {
             numbers.end_line();
-            read_element_blocks(mesh, &mut numbers)?;
+            read_element_blocks(mesh, numbers)?;
         }
     }
     Ok(())
@@ -304,9 +222,11 @@ fn read_element_blocks(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Re
 
 fn known(kind: i64) -> Result<Element, ReadReason> {
     let known = element(kind).filter(|element| !element.is_of_higher_order());
-    known.ok_or_else(|| ReadReason::Unsupported {
-        what: format!("elements of type {kind}"),
-        remedy: "save the mesh with elements of the first or second order".into(),
+    known.ok_or_else(|| {
+        ReadReason::unsupported(
+            format!("elements of type {kind}"),
+            "save the mesh with elements of the first or second order",
+        )
     })
 }
 

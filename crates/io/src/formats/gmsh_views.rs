@@ -3,9 +3,8 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::error::ReadReason;
-use crate::formats::gmsh_layout::Layout;
-use crate::formats::scanner::Scanner;
-use crate::number::NumberType;
+use crate::formats::gmsh_layout::Numbers;
+use crate::scanner::Scanner;
 use tetralod::geom::bits_of;
 
 /// What the values of a view are at.
@@ -85,34 +84,14 @@ pub(super) fn read_head(file: &mut Scanner<'_>, at: At) -> Result<Head, ReadReas
 }
 
 /// Reads the rows of a view.
-pub(super) fn read_rows(file: &mut Scanner<'_>, layout: Layout, head: Head) -> Result<View, ReadReason> {
-    if layout.binary {
-        file.skip_line();
-    }
+pub(super) fn read_rows(numbers: &mut Numbers<'_, '_>, head: Head) -> Result<View, ReadReason> {
+    numbers.end_line();
     let mut rows = HashMap::new();
     for _ in 0..head.count {
-        let (tag, nodes) = if layout.binary {
-            let tag = file.integers(1, NumberType::I32, layout.big)?[0];
-            let nodes = match head.at {
-                At::ElementNodes => file.integers(1, NumberType::I32, layout.big)?[0],
-                _ => 1,
-            };
-            (tag, nodes)
-        } else {
-            (file.number()?, if head.at == At::ElementNodes { file.number()? } else { 1 })
-        };
+        let tag = numbers.int()?;
+        let nodes = if head.at == At::ElementNodes { numbers.int()? } else { 1 };
         let nodes = usize::try_from(nodes).map_err(|_| ReadReason::Syntax(format!("{nodes} nodes")))?;
-        let count = nodes.saturating_mul(head.components);
-        let row = if layout.binary {
-            file.floats(count, NumberType::F64, layout.big)?
-        } else {
-            let mut row = Vec::with_capacity(file.capacity(count));
-            for _ in 0..count {
-                row.push(file.number()?);
-            }
-            row
-        };
-        rows.insert(tag, row);
+        rows.insert(tag, numbers.floats(nodes.saturating_mul(head.components))?);
     }
     Ok(View { head, rows })
 }

@@ -17,10 +17,10 @@ pub(super) fn reason(error: Error) -> ReadReason {
         },
         Error::Io(error) => ReadReason::Io(error.to_string()),
         Error::UnexpectedEof { needed, available, .. } => ReadReason::Truncated { needed, found: available },
-        Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) => ReadReason::Unsupported {
-            what: format!("a file with {what}"),
-            remedy: "write it again without compression, or with zlib (deflate)".into(),
-        },
+        Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) => ReadReason::unsupported(
+            format!("a file with {what}"),
+            "write it again without compression, or with zlib (deflate)",
+        ),
         Error::GroupNotFound(_) | Error::DatasetNotFound(_) | Error::AttributeNotFound(_) => {
             ReadReason::Missing(what)
         }

@@ -3,11 +3,12 @@
 //!
 //! References become the field `ref` at cells. What has no volume is left out.
 
-use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::error::{At, ReadError, ReadReason, in_file, shown};
 use crate::fields::in_order;
 use crate::formats::draft::Draft;
 use crate::formats::medit_cells::{Cells, KINDS, expect_known, ordering};
-use crate::formats::scanner::Scanner;
+use crate::number::NumberType;
+use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -96,8 +97,8 @@ impl<'a> Parts<'a> {
                 _ => values,
             };
             match of {
-                None => self.draft.at_points("sol", components, values, false)?,
-                Some(_) => self.draft.at_cells("sol", components, values, false)?,
+                None => self.draft.at_points("sol", components, false, || Ok(values))?,
+                Some(_) => self.draft.at_cells("sol", components, false, || Ok(values))?,
             }
         }
         Ok(())
@@ -150,12 +151,7 @@ fn read_sections(file: &mut Scanner<'_>, parts: &mut Parts<'_>) -> Result<(), Re
         match word {
             "End" => break,
             "Dimension" => expect_three(file.number()?)?,
-            "Vertices" => {
-                for _ in 0..file.number::<usize>()? {
-                    parts.draft.coordinates.extend(file.numbers::<f64, 3>()?);
-                    file.number::<f64>()?;
-                }
-            }
+            "Vertices" => Numbers { file, layout: None }.vertices(parts)?,
             "BezierBasis" => parts.cells.is_bezier = file.number::<i64>()? != 0,
             name => read_section(file, parts, name)?,
         }
@@ -164,20 +160,7 @@ fn read_sections(file: &mut Scanner<'_>, parts: &mut Parts<'_>) -> Result<(), Re
 }
 
 fn read_section(file: &mut Scanner<'_>, parts: &mut Parts<'_>, name: &str) -> Result<(), ReadReason> {
-    if let Some(kind) = KINDS.iter().position(|kind| kind.name == name) {
-        return read_cells(file, parts, kind);
-    }
-    if let Some((_, _, of)) = SOLUTIONS.iter().find(|(known, ..)| *known == name) {
-        let arrays = read_solution(file)?;
-        return parts.solution(*of, arrays);
-    }
-    if let Some((order, width)) = ordering(|(known, _)| known == name) {
-        let count: usize = file.number()?;
-        let mut table = Vec::new();
-        for _ in 0..count.saturating_mul(width) {
-            table.push(file.number()?);
-        }
-        parts.cells.orders.insert(order, table);
+    if (Numbers { file, layout: None }).section(parts, |known, _| known == name)? {
         return Ok(());
     }
     if let Some((_, _, kind)) = FLAT.iter().find(|(known, ..)| *known == name) {
@@ -187,36 +170,18 @@ fn read_section(file: &mut Scanner<'_>, parts: &mut Parts<'_>, name: &str) -> Re
     skip_numbers(file, name)
 }
 
-fn read_cells(file: &mut Scanner<'_>, parts: &mut Parts<'_>, kind: usize) -> Result<(), ReadReason> {
-    let count: usize = file.number()?;
-    let mut points = Vec::new();
-    for _ in 0..count {
-        points.clear();
-        for _ in 0..KINDS[kind].points {
-            // They are numbered from 1.
-            points.push(file.number::<i64>()?.saturating_sub(1));
-        }
-        let reference = file.number()?;
-        parts.cells.add(&mut parts.draft, kind, &points, reference);
-    }
-    parts.cells.counts.push((KINDS[kind].name, count));
-    Ok(())
-}
-
 /// Refuses meshes of surfaces in a plane.
 pub(super) fn expect_three(dimension: i64) -> Result<(), ReadReason> {
     if dimension == 3 {
         return Ok(());
     }
-    let what = format!("a mesh in {dimension} dimensions");
-    Err(ReadReason::Unsupported { what, remedy: "give a mesh of volumes".into() })
+    Err(ReadReason::unsupported(format!("a mesh in {dimension} dimensions"), "give a mesh of volumes"))
 }
 
 /// Steps over a section that is not needed, up to the next keyword.
 fn skip_numbers(file: &mut Scanner<'_>, keyword: &str) -> Result<(), ReadReason> {
     if !keyword.starts_with(|c: char| c.is_ascii_alphabetic()) {
-        let shown: String = keyword.chars().take(24).collect();
-        return Err(ReadReason::Syntax(format!("\"{shown}\" instead of a keyword")));
+        return Err(ReadReason::Syntax(format!("\"{}\" instead of a keyword", shown(keyword))));
     }
     let is_content = |word: &str| word.parse::<f64>().is_ok() || word.starts_with('"');
     while let Some(word) = file.word_if(is_content) {
@@ -228,28 +193,120 @@ fn skip_numbers(file: &mut Scanner<'_>, keyword: &str) -> Result<(), ReadReason>
     Ok(())
 }
 
-/// The arrays of a solution.
-fn read_solution(file: &mut Scanner<'_>) -> Result<Vec<Array>, ReadReason> {
-    let count: usize = file.number()?;
-    let mut arrays = Vec::new();
-    for _ in 0..file.number::<usize>()? {
-        arrays.push(Array { components: components_of(file.number()?)?, values: Vec::new() });
+/// Numbers of either encoding.
+pub(super) struct Numbers<'s, 'a> {
+    pub file: &'s mut Scanner<'a>,
+    /// How they are written; none of text.
+    pub layout: Option<Layout>,
+}
+
+/// How the numbers of a binary file are written.
+#[derive(Clone, Copy)]
+pub(super) struct Layout {
+    pub big: bool,
+    /// Counts and numbers of vertices.
+    pub integer: NumberType,
+    /// Where the next section is.
+    pub position: NumberType,
+    pub float: NumberType,
+}
+
+impl Numbers<'_, '_> {
+    pub fn count(&mut self) -> Result<usize, ReadReason> {
+        let Some(Layout { big, integer, .. }) = self.layout else { return self.file.number() };
+        let count = self.file.integers(1, integer, big)?[0];
+        usize::try_from(count).map_err(|_| ReadReason::Syntax(format!("{count} is not a count")))
     }
-    if arrays.is_empty() {
-        return Err(ReadReason::Syntax("a solution without values".into()));
-    }
-    for _ in 0..count {
-        for Array { components, values } in &mut arrays {
-            for _ in 0..*components {
-                values.push(file.number::<f64>()?);
-            }
+
+    /// The next `count` numbers that are an `int` in binary files.
+    fn ints(&mut self, count: usize) -> Result<Vec<i64>, ReadReason> {
+        match self.layout {
+            Some(Layout { big, .. }) => self.file.integers(count, NumberType::I32, big),
+            None => (0..count).map(|_| self.file.number()).collect(),
         }
     }
-    Ok(arrays)
+
+    fn floats(&mut self, count: usize) -> Result<Vec<f64>, ReadReason> {
+        match self.layout {
+            Some(Layout { big, float, .. }) => self.file.floats(count, float, big),
+            None => (0..count).map(|_| self.file.number()).collect(),
+        }
+    }
+
+    /// The points of a cell, which are numbered from 1, and its reference.
+    fn cell(&mut self, points: usize) -> Result<(Vec<i64>, f64), ReadReason> {
+        let Some(Layout { big, integer, .. }) = self.layout else {
+            return Ok((self.ints(points)?, self.file.number()?));
+        };
+        let mut numbers = self.file.integers(points + 1, integer, big)?;
+        let reference = numbers.pop().unwrap_or_default();
+        Ok((numbers, reference as f64))
+    }
+
+    pub fn vertices(&mut self, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
+        for _ in 0..self.count()? {
+            parts.draft.coordinates.extend(self.floats(3)?);
+            // As a cell without points.
+            self.cell(0)?;
+        }
+        Ok(())
+    }
+
+    /// Reads a section if it has cells, a solution or the order of points, and `is_it` says so of its name and number.
+    pub fn section(
+        &mut self,
+        parts: &mut Parts<'_>,
+        is_it: impl Fn(&str, i64) -> bool,
+    ) -> Result<bool, ReadReason> {
+        if let Some(kind) = KINDS.iter().position(|kind| is_it(kind.name, kind.number)) {
+            self.cells(kind, parts)?;
+        } else if let Some((_, _, of)) = SOLUTIONS.iter().find(|(name, number, _)| is_it(name, *number)) {
+            let arrays = self.solution()?;
+            parts.solution(*of, arrays)?;
+        } else if let Some((order, width)) = ordering(|(name, number)| is_it(name, number)) {
+            let count = self.count()?.saturating_mul(width);
+            parts.cells.orders.insert(order, self.ints(count)?);
+        } else {
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
+    fn cells(&mut self, kind: usize, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
+        let count = self.count()?;
+        for _ in 0..count {
+            let (mut points, reference) = self.cell(KINDS[kind].points)?;
+            points.iter_mut().for_each(|point| *point = point.saturating_sub(1));
+            parts.cells.add(&mut parts.draft, kind, &points, reference);
+        }
+        parts.cells.counts.push((KINDS[kind].name, count));
+        Ok(())
+    }
+
+    fn solution(&mut self) -> Result<Vec<Array>, ReadReason> {
+        let count = self.count()?;
+        let types = match self.layout {
+            Some(_) => usize::try_from(self.ints(1)?[0]).unwrap_or(0),
+            None => self.file.number()?,
+        };
+        let mut arrays = Vec::new();
+        for _ in 0..types {
+            arrays.push(Array { components: components_of(self.ints(1)?[0])?, values: Vec::new() });
+        }
+        if arrays.is_empty() {
+            return Err(ReadReason::Syntax("a solution without values".into()));
+        }
+        for _ in 0..count {
+            for Array { components, values } in &mut arrays {
+                values.extend(self.floats(*components)?);
+            }
+        }
+        Ok(arrays)
+    }
 }
 
 /// How many values a scalar, a vector, a symmetric tensor or a matrix has.
-pub(super) fn components_of(kind: i64) -> Result<usize, ReadReason> {
+fn components_of(kind: i64) -> Result<usize, ReadReason> {
     match kind {
         1 => Ok(1),
         2 => Ok(3),

@@ -4,10 +4,10 @@
 use std::ops::RangeInclusive;
 
 use crate::error::{At, ReadError, ReadReason, in_file};
-use crate::formats::medit::{Array, FLAT, Parts, SOLUTIONS, components_of, expect_three};
-use crate::formats::medit_cells::{KINDS, expect_known, ordering, refused};
-use crate::formats::scanner::Scanner;
+use crate::formats::medit::{FLAT, Layout, Numbers, Parts, expect_three};
+use crate::formats::medit_cells::{expect_known, refused};
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -24,17 +24,6 @@ const HARMLESS: [RangeInclusive<i64>; 7] = [1..=7, 11..=25, 27..=29, 31..=32, 34
 /// Whether a file begins with these bytes: a one in either byte order, then the version.
 pub(super) fn is_first(bytes: &[u8]) -> bool {
     layout(bytes).is_some()
-}
-
-/// How the numbers of a file are written.
-#[derive(Clone, Copy)]
-struct Layout {
-    big: bool,
-    /// Counts and numbers of vertices.
-    integer: NumberType,
-    /// Where the next section is.
-    position: NumberType,
-    float: NumberType,
 }
 
 fn layout(bytes: &[u8]) -> Option<Layout> {
@@ -67,43 +56,36 @@ pub(super) fn read(
     beside: Beside<'_>,
 ) -> Result<TetMesh, ReadError> {
     let mut parts = Parts::new(options);
-    each_section(bytes, &mut |section, number| section.read(number, &mut parts))?;
+    read_sections(bytes, &mut parts)?;
     // A mesh need not have one.
     if let Ok(bytes) = beside(solution) {
-        let read = each_section(&bytes, &mut |section, number| section.read(number, &mut parts));
-        read.map_err(|error| in_file(error, solution))?;
+        read_sections(&bytes, &mut parts).map_err(|error| in_file(error, solution))?;
     }
     parts.finish().at(String::new)
 }
 
-/// The data of a section.
-struct Section<'a> {
-    data: Scanner<'a>,
-    layout: Layout,
-}
-
-/// Calls `read` with each section and its number.
-fn each_section(
-    bytes: &[u8],
-    read: &mut dyn FnMut(&mut Section<'_>, i64) -> Result<(), ReadReason>,
-) -> Result<(), ReadError> {
+/// Reads the sections of a mesh or of a solution.
+fn read_sections(bytes: &[u8], parts: &mut Parts<'_>) -> Result<(), ReadError> {
     let wrong = || ReadReason::Damaged("it does not begin as such a file does".into());
     let layout = layout(bytes).ok_or_else(wrong).at(String::new)?;
     // Behind the mark of the byte order and the version.
     let mut at = 8;
     while at < bytes.len() {
-        let mut section = Section { data: Scanner::new(&bytes[at..]), layout };
-        let number = section.integer(NumberType::I32).at(|| format!("byte {at}"))?;
+        let mut file = Scanner::new(&bytes[at..]);
+        // One number is asked for at a time, so there is one.
+        let mut integer = |kind: NumberType| Ok(file.integers(1, kind, layout.big)?[0]);
+        let number = integer(NumberType::I32).at(|| format!("byte {at}"))?;
         let place = || format!("section {number} at byte {at}");
         if number == END {
             break;
         }
-        let next = section.integer(layout.position).at(place)?;
-        if number == DIMENSION {
-            let dimension = section.integer(NumberType::I32).at(place)?;
-            expect_three(dimension).at(place)?;
+        let next = integer(layout.position).at(place)?;
+        match number {
+            DIMENSION => integer(NumberType::I32).and_then(expect_three).at(place)?,
+            BEZIER => parts.cells.is_bezier = integer(NumberType::I32).at(place)? != 0,
+            _ => read_section(&mut Numbers { file: &mut file, layout: Some(layout) }, number, parts)
+                .at(place)?,
         }
-        read(&mut section, number).at(place)?;
         if next == 0 {
             break;
         }
@@ -114,88 +96,22 @@ fn each_section(
     Ok(())
 }
 
-impl Section<'_> {
-    fn integer(&mut self, kind: NumberType) -> Result<i64, ReadReason> {
-        // One number was asked for, so there is one.
-        Ok(self.data.integers(1, kind, self.layout.big)?[0])
+/// Reads the section of this number.
+fn read_section(numbers: &mut Numbers<'_, '_>, number: i64, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
+    if numbers.section(parts, |_, known| known == number)? {
+        return Ok(());
     }
-
-    fn count(&mut self) -> Result<usize, ReadReason> {
-        let count = self.integer(self.layout.integer)?;
-        usize::try_from(count).map_err(|_| ReadReason::Syntax(format!("{count} is not a count")))
+    if let Some((_, _, kind)) = FLAT.iter().find(|(_, known, _)| *known == number) {
+        parts.draft.add_flat(*kind, numbers.count()? as u64);
+        return Ok(());
     }
-
-    /// Reads the section of this number.
-    fn read(&mut self, number: i64, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
-        if let Some(kind) = KINDS.iter().position(|kind| kind.number == number) {
-            return self.cells(kind, parts);
-        }
-        if let Some((_, _, of)) = SOLUTIONS.iter().find(|(_, known, _)| *known == number) {
-            let arrays = self.solution()?;
-            return parts.solution(*of, arrays);
-        }
-        if let Some((order, width)) = ordering(|(_, known)| known == number) {
-            let count = self.count()?.saturating_mul(width);
-            let table = self.data.integers(count, NumberType::I32, self.layout.big)?;
-            parts.cells.orders.insert(order, table);
-            return Ok(());
-        }
-        if let Some((_, _, kind)) = FLAT.iter().find(|(_, known, _)| *known == number) {
-            let count = self.count()? as u64;
-            parts.draft.add_flat(*kind, count);
-            return Ok(());
-        }
-        match number {
-            VERTICES => self.vertices(parts),
-            BEZIER => {
-                parts.cells.is_bezier = self.integer(NumberType::I32)? != 0;
-                Ok(())
-            }
-            number if HARMLESS.iter().chain([&ORDERINGS]).any(|range| range.contains(&number)) => Ok(()),
-            number => match refused(number) {
-                Some(name) => expect_known(name),
-                None => parts.skip(&format!("number {number}")),
-            },
-        }
-    }
-
-    fn vertices(&mut self, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
-        for _ in 0..self.count()? {
-            let place = self.data.floats(3, self.layout.float, self.layout.big)?;
-            parts.draft.coordinates.extend(place);
-            self.integer(self.layout.integer)?;
-        }
-        Ok(())
-    }
-
-    fn cells(&mut self, kind: usize, parts: &mut Parts<'_>) -> Result<(), ReadReason> {
-        let (count, points) = (self.count()?, KINDS[kind].points);
-        for _ in 0..count {
-            let numbers = self.data.integers(points + 1, self.layout.integer, self.layout.big)?;
-            // They are numbered from 1.
-            let of_cell: Vec<i64> = numbers[..points].iter().map(|point| point.saturating_sub(1)).collect();
-            parts.cells.add(&mut parts.draft, kind, &of_cell, numbers[points] as f64);
-        }
-        parts.cells.counts.push((KINDS[kind].name, count));
-        Ok(())
-    }
-
-    fn solution(&mut self) -> Result<Vec<Array>, ReadReason> {
-        let count = self.count()?;
-        let mut arrays = Vec::new();
-        for _ in 0..self.integer(NumberType::I32)? {
-            let components = components_of(self.integer(NumberType::I32)?)?;
-            arrays.push(Array { components, values: Vec::new() });
-        }
-        if arrays.is_empty() {
-            return Err(ReadReason::Syntax("a solution without values".into()));
-        }
-        for _ in 0..count {
-            for Array { components, values } in &mut arrays {
-                values.extend(self.data.floats(*components, self.layout.float, self.layout.big)?);
-            }
-        }
-        Ok(arrays)
+    match number {
+        VERTICES => numbers.vertices(parts),
+        number if HARMLESS.iter().chain([&ORDERINGS]).any(|range| range.contains(&number)) => Ok(()),
+        number => match refused(number) {
+            Some(name) => expect_known(name),
+            None => parts.skip(&format!("number {number}")),
+        },
     }
 }
 

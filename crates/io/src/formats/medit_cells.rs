@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use crate::cell_shapes::{HEXAHEDRON_EDGES, PYRAMID_14, PYRAMID_EDGES, TETRAHEDRON_EDGES, WEDGE_EDGES};
-use crate::error::ReadReason;
+use crate::error::{ReadReason, shown};
 use crate::formats::draft::Draft;
 
 /// A kind of cells with a volume.
@@ -73,11 +73,8 @@ pub(super) fn expect_known(name: &str) -> Result<(), ReadReason> {
     if !solids.iter().any(|solid| name.starts_with(solid)) || name.ends_with("Ordering") {
         return Ok(());
     }
-    let what = format!("cells in section {}", name.chars().take(24).collect::<String>());
-    Err(ReadReason::Unsupported {
-        what,
-        remedy: "save the mesh with cells of the first or second order".into(),
-    })
+    let what = format!("cells in section {}", shown(name));
+    Err(ReadReason::unsupported(what, "save the mesh with cells of the first or second order"))
 }
 
 /// The name of a section of cells that are refused.
@@ -116,11 +113,8 @@ impl Cells {
     pub fn finish(self, draft: &mut Draft<'_>) -> Result<(), ReadReason> {
         let mut references = self.references;
         if self.is_bezier && !self.quadratic.is_empty() {
-            let what = "quadratic cells with control points of Bezier's (BezierBasis)".into();
-            return Err(ReadReason::Unsupported {
-                what,
-                remedy: "save them with points on the cells".into(),
-            });
+            let what = "quadratic cells with control points of Bezier's (BezierBasis)";
+            return Err(ReadReason::unsupported(what, "save them with points on the cells"));
         }
         for (kind, points) in &self.quadratic {
             let Kind { vtk, points: count, ordering, name, .. } = &KINDS[*kind];
@@ -130,18 +124,18 @@ impl Cells {
                 Some(table) => stated_order(&places, table),
                 None => order_by_places(&places, points, &draft.coordinates),
             };
-            let order = order.ok_or_else(|| ReadReason::Unsupported {
-                what: format!("the order of the points of {name}"),
-                remedy: format!(
-                    "state it in a section {name}Ordering, or save the cells with straight edges"
-                ),
+            let order = order.ok_or_else(|| {
+                ReadReason::unsupported(
+                    format!("the order of the points of {name}"),
+                    format!("state it in a section {name}Ordering, or save the cells with straight edges"),
+                )
             })?;
             for cell in points.chunks_exact(*count) {
                 draft.add_cell(*vtk, order.iter().map(|&p| cell[p]));
             }
             references.extend(self.references_of_quadratic.get(kind).into_iter().flatten());
         }
-        draft.at_cells("ref", 1, references, true)
+        draft.at_cells("ref", 1, true, || Ok(references))
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, shown};
 use crate::formats::volume::{
     Axis, MAX_COMPONENTS, SampleArray, Volume, from_files, from_text, numbered_files, numbers, three,
     unpacked, wrong_dimensions,
@@ -100,8 +100,8 @@ impl Header {
             "HeaderSize" => self.skipped = numbers(value, key)?.first().copied().unwrap_or(0),
             "ElementDataFile" => self.file = text(),
             "ObjectType" if !value.eq_ignore_ascii_case("Image") => {
-                let what = format!("an object of type \"{}\"", value.chars().take(24).collect::<String>());
-                return Err(ReadReason::Unsupported { what, remedy: "give an Image".into() });
+                let what = format!("an object of type \"{}\"", shown(value));
+                return Err(ReadReason::unsupported(what, "give an Image"));
             }
             // ITK and VTK do not apply these, either.
             "ElementToIntensityFunctionSlope" if is_not(value, 1.0) => self.not_applied(key, value),
@@ -170,11 +170,8 @@ impl Header {
                     rest.split(|c| *c == b'\n').map(|line| String::from_utf8_lossy(line.trim_ascii()));
                 let names: Vec<String> =
                     lines.filter(|line| !line.is_empty()).map(Cow::into_owned).take(count).collect();
-                if names.len() == count {
-                    return Ok(names);
-                }
                 let (needed, found) = (count as u64, names.len() as u64);
-                Err(ReadReason::Truncated { needed, found })
+                if found == needed { Ok(names) } else { Err(ReadReason::Truncated { needed, found }) }
             }
             [pattern, ref range @ ..] if pattern.contains('%') => {
                 // The last slice is found by their number, each has the next number.

@@ -23,7 +23,6 @@ mod medit_cells;
 mod metaimage;
 mod netgen;
 mod nrrd;
-mod scanner;
 pub(super) mod tetgen;
 mod volume;
 #[cfg(feature = "hdf5")]
@@ -32,6 +31,7 @@ mod vtkhdf;
 use std::path::Path;
 
 use crate::error::ReadError;
+use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
@@ -62,7 +62,7 @@ impl Format {
         if metaimage::is_header(start) {
             return Some(Self::MetaImage);
         }
-        match scanner::Scanner::with_comments(bytes).next_word().ok()?? {
+        match Scanner::with_comments(bytes).next_word().ok()?? {
             medit::FIRST => Some(Self::Medit),
             netgen::FIRST => Some(Self::Netgen),
             _ => None,
@@ -81,8 +81,14 @@ impl Format {
     }
 }
 
+/// Whether these formats are read.
+const IS_NATIVE: bool = cfg!(not(target_arch = "wasm32"));
+
 /// What the format of these bytes is called, if it is one of these.
 pub(super) fn name(bytes: &[u8]) -> Option<&'static str> {
+    if !IS_NATIVE {
+        return None;
+    }
     #[cfg(feature = "hdf5")]
     if let Some(name) = hdf5::name(bytes) {
         return Some(name);
@@ -97,6 +103,9 @@ pub(super) fn read(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Option<Result<TetMesh, ReadError>> {
+    if !IS_NATIVE {
+        return None;
+    }
     #[cfg(feature = "hdf5")]
     if hdf5::is_known(bytes) {
         return Some(hdf5::read(bytes, options));

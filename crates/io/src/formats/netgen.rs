@@ -4,7 +4,7 @@
 use crate::ReadOptions;
 use crate::error::{At, ReadError, ReadReason};
 use crate::formats::draft::Draft;
-use crate::formats::scanner::Scanner;
+use crate::scanner::Scanner;
 use tetralod::mesh::TetMesh;
 
 /// The first word of every file.
@@ -42,7 +42,7 @@ fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRe
                 let dimension: i64 = file.number()?;
                 if dimension != 3 {
                     let what = format!("a mesh in {dimension} dimensions");
-                    return Err(ReadReason::Unsupported { what, remedy: "give a mesh of volumes".into() });
+                    return Err(ReadReason::unsupported(what, "give a mesh of volumes"));
                 }
             }
             "volumeelements" => {
@@ -80,7 +80,7 @@ fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRe
     if draft.coordinates.is_empty() {
         return Err(ReadReason::Missing("section points".into()));
     }
-    draft.at_cells("material", 1, materials, true)
+    draft.at_cells("material", 1, true, || Ok(materials))
 }
 
 /// VTK's type of triangles: what surfaces are mostly of.
@@ -88,9 +88,11 @@ const TRIANGLE: i64 = 5;
 
 fn add_cell(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadReason> {
     let count: usize = file.number()?;
-    let (kind, order) = cell(count).ok_or_else(|| ReadReason::Unsupported {
-        what: format!("a cell of {count} points"),
-        remedy: "save the mesh with linear cells, or with quadratic tetrahedra, pyramids and prisms".into(),
+    let (kind, order) = cell(count).ok_or_else(|| {
+        ReadReason::unsupported(
+            format!("a cell of {count} points"),
+            "save the mesh with linear cells, or with quadratic tetrahedra, pyramids and prisms",
+        )
     })?;
     let mut points = [0_i64; 15];
     for point in &mut points[..count] {

@@ -5,13 +5,13 @@
 
 use std::borrow::Cow;
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::formats::volume::{
     Axis, MAX_COMPONENTS, SampleArray, Volume, from_files, from_text, last_unpacked, numbered_files, numbers,
     unpacked, wrong_dimensions,
 };
 use crate::number::NumberType;
-use crate::{Beside, MemoryLimit, ReadOptions};
+use crate::{Beside, MemoryLimit, ReadOptions, error};
 use flate2::read::MultiGzDecoder;
 use tetralod::mesh::TetMesh;
 
@@ -89,8 +89,8 @@ fn check_version(line: &str) -> Result<(), ReadReason> {
     if version.is_some_and(|version| (1..=5).contains(&version)) {
         return Ok(());
     }
-    let what = format!("version \"{}\"", line.chars().take(24).collect::<String>());
-    Err(ReadReason::Unsupported { what, remedy: "write it as NRRD0005 or before".into() })
+    let what = format!("version \"{}\"", error::shown(line));
+    Err(ReadReason::unsupported(what, "write it as NRRD0005 or before"))
 }
 
 impl Header {
@@ -140,8 +140,8 @@ impl Header {
             | "block size" | "blocksize" => {}
             other => {
                 let what = format!("the field \"{}\"", shown(other));
-                let remedy = "leave it out, or write it as a pair with := if it is a remark".into();
-                return Err(ReadReason::Unsupported { what, remedy });
+                let remedy = "leave it out, or write it as a pair with := if it is a remark";
+                return Err(ReadReason::unsupported(what, remedy));
             }
         }
         Ok(false)
@@ -164,8 +164,7 @@ impl Header {
 
     fn volume(&self) -> Result<Volume, ReadReason> {
         if self.kind == "block" {
-            let what = "samples of type block".into();
-            return Err(ReadReason::Unsupported { what, remedy: "write them as numbers".into() });
+            return Err(ReadReason::unsupported("samples of type block", "write them as numbers"));
         }
         let number = number_type(&self.kind)
             .ok_or_else(|| ReadReason::Syntax(format!("type \"{}\" is not known", shown(&self.kind))))?;
@@ -207,8 +206,7 @@ impl Header {
         let wrong = lists.into_iter().chain(more).find(|(_, found)| *found > 0 && *found != count);
         let wrong = wrong.or((given != count).then_some(("dimension", given)));
         if let Some((what, found)) = wrong {
-            let what = format!("axes in \"{what}\"");
-            return Err(ReadReason::Count { what, expected: count as u64, found: found as u64 });
+            expect_count(format!("axes in \"{what}\""), count, found)?;
         }
         let mut is_space = self.of_directions(count)?;
         for (axis, kind) in self.kinds.iter().enumerate() {
@@ -223,8 +221,8 @@ impl Header {
         let unknown = is_space.iter().filter(|known| known.is_none()).count();
         if of_space < 3 && of_space + unknown > 3 {
             let what = format!("{count} axes without \"kinds\", of which it is not said which are of space,");
-            let remedy = "add the field, such as \"kinds: vector domain domain domain\"".into();
-            return Err(ReadReason::Unsupported { what, remedy });
+            let remedy = "add the field, such as \"kinds: vector domain domain domain\"";
+            return Err(ReadReason::unsupported(what, remedy));
         }
         // Axes of which nothing is said are of space while these are less than three.
         let axis = |(size, known): (&u64, &Option<bool>)| Axis {
@@ -238,10 +236,7 @@ impl Header {
     fn of_directions(&self, count: usize) -> Result<Vec<Option<bool>>, ReadReason> {
         let Some(text) = &self.directions else { return Ok(vec![None; count]) };
         let found: Vec<Option<bool>> = vectors(text)?.iter().map(|vector| Some(vector.is_some())).collect();
-        if found.len() != count {
-            let what = "axes in \"space directions\"".into();
-            return Err(ReadReason::Count { what, expected: count as u64, found: found.len() as u64 });
-        }
+        expect_count("axes in \"space directions\"", count, found.len())?;
         Ok(found)
     }
 
@@ -369,10 +364,10 @@ impl Header {
                 if encoding == "hex" { from_hex(data) } else { from_text(data, volume.number, volume.big) }
             }
             "" => Err(ReadReason::Missing("the field \"encoding\"".into())),
-            other => Err(ReadReason::Unsupported {
-                what: format!("samples in encoding \"{}\"", shown(other)),
-                remedy: "write them as raw or gzip".into(),
-            }),
+            other => Err(ReadReason::unsupported(
+                format!("samples in encoding \"{}\"", shown(other)),
+                "write them as raw or gzip",
+            )),
         }
     }
 }
@@ -430,13 +425,10 @@ fn check_kind(kind: &str, size: u64) -> Result<(), ReadReason> {
         "3d-masked-matrix" => 10,
         other => {
             let what = format!("an axis of kind \"{}\"", shown(other));
-            return Err(ReadReason::Unsupported { what, remedy: "write it as a list".into() });
+            return Err(ReadReason::unsupported(what, "write it as a list"));
         }
     };
-    if size == expected {
-        return Ok(());
-    }
-    Err(ReadReason::Count { what: format!("values of kind {kind}"), expected, found: size })
+    expect_count(format!("values of kind {kind}"), expected, size)
 }
 
 /// The arrays that the values on an axis of a kind become. Symmetric tensors get the order that VTK has.

@@ -12,7 +12,7 @@ use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::component_of;
 use crate::formats::draft::Draft;
 use crate::formats::medit_cells;
-use crate::formats::scanner::{Scanner, parsed};
+use crate::scanner::{Scanner, parsed};
 use tetralod::mesh::TetMesh;
 
 /// Reads the two files of which `path` is one.
@@ -54,7 +54,7 @@ fn read_nodes(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<i64, Read
     let [count, dimension, attributes, markers] = header(file, [0, 3, 0, 0])?;
     if dimension != 3 {
         let what = format!("points in {dimension} dimensions");
-        return Err(ReadReason::Unsupported { what, remedy: "give points in three".into() });
+        return Err(ReadReason::unsupported(what, "give points in three"));
     }
     let words = needed(4, attributes)?;
     let (mut first, mut has_more) = (0, false);
@@ -81,7 +81,7 @@ fn read_nodes(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<i64, Read
     }
     for i in 0..attributes.min(values.len()) {
         let of_one = component_of(&values, i, attributes);
-        draft.at_points(&format!("attribute_{}", i + 1), 1, of_one, false)?;
+        draft.at_points(&format!("attribute_{}", i + 1), 1, false, || Ok(of_one))?;
     }
     Ok(first)
 }
@@ -110,7 +110,7 @@ fn read_cells(file: &mut Scanner<'_>, draft: &mut Draft<'_>, first: i64) -> Resu
     add_cells(draft, &cells, points);
     for i in 0..attributes.min(values.len()) {
         let of_one = component_of(&values, i, attributes);
-        draft.at_cells(&format!("region_{}", i + 1), 1, of_one, false)?;
+        draft.at_cells(&format!("region_{}", i + 1), 1, false, || Ok(of_one))?;
     }
     Ok(())
 }

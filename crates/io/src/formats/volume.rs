@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::{Collector, component_name, in_order};
 use crate::grid::{GridValues, Placement, checked_dims};
 use crate::number::NumberType;
@@ -92,11 +92,7 @@ impl Volume {
 
     /// The mesh of these samples; a grid along the axes comes without points and tetrahedra.
     pub fn mesh(&self, samples: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadReason> {
-        let expected = self.bytes()?;
-        if samples.len() != expected {
-            let (expected, found) = (expected as u64, samples.len() as u64);
-            return Err(ReadReason::Count { what: "bytes of samples".into(), expected, found });
-        }
+        expect_count("bytes of samples", self.bytes()?, samples.len())?;
         let numbers = (samples.len() / self.number.size()) as u64;
         let _held = options.memory.hold(8 * numbers)?;
         let mut fields = Collector::new(options);
@@ -197,10 +193,7 @@ pub(super) fn from_files(
     for name in names {
         let place = || format!("\"{name}\"");
         let mut of_one = read(&beside(name).at(|| key.to_owned())?, part).at(place)?;
-        if of_one.len() != part {
-            let (expected, found) = (part as u64, of_one.len() as u64);
-            return Err(ReadReason::Count { what: "bytes of samples".into(), expected, found }).at(place);
-        }
+        expect_count("bytes of samples", part, of_one.len()).at(place)?;
         samples.append(&mut of_one);
     }
     Ok(samples)
@@ -239,7 +232,7 @@ pub(super) fn wrong_dimensions(dimensions: usize) -> ReadReason {
         other => format!("an image in {other} dimensions"),
     };
     let remedy = if dimensions < 3 { "stack its slices to a volume" } else { "give one in three dimensions" };
-    ReadReason::Unsupported { what, remedy: remedy.into() }
+    ReadReason::unsupported(what, remedy)
 }
 
 /// Numbers that stand in one line of a header.

@@ -10,7 +10,7 @@ use hdf5_reader::{Dataset, Hdf5File};
 
 use crate::cell_types;
 use crate::cells::{self, CellList, Numbering};
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::formats::hdf5_values::{
     all_integers, attribute_values, checked_times, floats, integers, number_kind, reason, row_length, rows,
@@ -55,15 +55,11 @@ pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, Re
     let times = times(file)?;
     let step = (!times.is_empty()).then_some(options.step as u64);
     let mut reader = Reader { file, options, step, axes: 1, known: RefCell::default() };
-    if options.step >= times.len().max(1) {
-        let what = format!("time step {} of {}", options.step, times.len().max(1));
-        return Err(ReadReason::Missing(what)).at(place);
-    }
+    options.expect_step(times.len()).at(place)?;
     let version = reader.attribute("Version").at(place)?;
     if !version.first().is_some_and(|major| MAJOR_VERSIONS.contains(major)) {
         let what = format!("version {version:?} of VTKHDF");
-        return Err(ReadReason::Unsupported { what, remedy: "write it as version 2, or as .vtu".into() })
-            .at(place);
+        return Err(ReadReason::unsupported(what, "write it as version 2, or as .vtu")).at(place);
     }
     let root = file.group(ROOT).map_err(reason).at(place)?;
     let kind = root.attribute("Type").and_then(|kind| kind.read_string()).map_err(reason).at(place)?;
@@ -75,8 +71,8 @@ pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, Re
         }
         other => {
             let what = format!("a data set of type {other}");
-            let remedy = "give an UnstructuredGrid or ImageData".into();
-            return Err(ReadReason::Unsupported { what, remedy }).at(place);
+            let remedy = "give an UnstructuredGrid or ImageData";
+            return Err(ReadReason::unsupported(what, remedy)).at(place);
         }
     };
     let time = times.get(options.step).copied();
@@ -262,11 +258,7 @@ impl Reader<'_> {
 
     fn positions(&self, piece: &Piece) -> Result<Vec<[f64; 3]>, ReadReason> {
         let points = self.dataset("Points")?;
-        let length = row_length(&points)?;
-        if length != 3 {
-            let what = "components of the points".into();
-            return Err(ReadReason::Count { what, expected: 3, found: length as u64 });
-        }
+        expect_count("components of the points", 3_u64, row_length(&points)?)?;
         let count = piece.points.end.saturating_sub(piece.points.start);
         self.options.memory.take(count.saturating_mul(24))?;
         Ok(points_from(&floats(&points, piece.points.clone())?))
@@ -289,11 +281,8 @@ impl Reader<'_> {
         ends.remove(0);
         cells::resolve_orders(&mut types, &ends);
         cells::most_tets(&types)?;
-        let found = cells::checked_ends(&types, &ends)? as u64;
-        let expected = piece.ids.end - piece.ids.start;
-        if found != expected {
-            return Err(ReadReason::Count { what: "points of cells".into(), expected, found });
-        }
+        let found = cells::checked_ends(&types, &ends)?;
+        expect_count("points of cells", piece.ids.end - piece.ids.start, found)?;
         let connectivity = integers(&self.dataset("Connectivity")?, piece.ids.clone())?;
         Ok(Some(CellList { types, ends, connectivity }))
     }
@@ -321,11 +310,8 @@ impl Reader<'_> {
     /// The fields in a group, beside these at points, and those that nobody asked for.
     fn fields(&self, group: &str, piece: &Piece, at_points: &[Field]) -> Result<[Vec<Field>; 2], ReadError> {
         self.collect(group, at_points, &|dataset, components| {
-            let length = row_length(dataset)?;
-            if length != components {
-                let what = format!("components of \"{}\"", dataset.name());
-                return Err(ReadReason::Count { what, expected: components as u64, found: length as u64 });
-            }
+            let what = format!("components of \"{}\"", dataset.name());
+            expect_count(what, components, row_length(dataset)?)?;
             let name = dataset.name().rsplit('/').next().unwrap_or_default();
             floats(dataset, self.rows_of(group, name, piece)?)
         })
@@ -471,10 +457,8 @@ impl Reader<'_> {
                 floats(dataset, first..first.saturating_add(1))
             }
         }?;
-        let (expected, found) = (dims.iter().product::<u64>() * components as u64, values.len() as u64);
-        if found != expected {
-            return Err(ReadReason::Count { what: format!("values of \"{name}\""), expected, found });
-        }
+        let expected = dims.iter().product::<u64>() * components as u64;
+        expect_count(format!("values of \"{name}\""), expected, values.len())?;
         Ok(values)
     }
 }
@@ -486,7 +470,6 @@ fn count(number: i64) -> Result<u64, ReadReason> {
 
 /// As many numbers as there must be.
 fn fixed<const N: usize>(list: &[f64], name: &str) -> Result<[f64; N], ReadReason> {
-    let (expected, found) = (N as u64, list.len() as u64);
-    let wrong = || ReadReason::Count { what: format!("numbers of attribute {name}"), expected, found };
-    list.try_into().map_err(|_| wrong())
+    expect_count(format!("numbers of attribute {name}"), N, list.len())?;
+    Ok(std::array::from_fn(|i| list[i]))
 }

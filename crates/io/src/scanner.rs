@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::error::ReadReason;
+use crate::error::{ReadReason, shown};
 use crate::number::NumberType;
 
 /// A position in a file.
@@ -142,10 +142,8 @@ impl<'a> Scanner<'a> {
 
 /// The number that a word stands for.
 pub(super) fn parsed<T: FromStr>(word: &str) -> Result<T, ReadReason> {
-    word.parse().map_err(|_| {
-        let shown: String = word.chars().take(24).collect();
-        ReadReason::Syntax(format!("\"{shown}\" is not a number of the expected kind"))
-    })
+    let wrong = || ReadReason::Syntax(format!("\"{}\" is not a number of the expected kind", shown(word)));
+    word.parse().map_err(|_| wrong())
 }
 
 #[cfg(test)]
