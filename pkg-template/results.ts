@@ -84,6 +84,8 @@ export interface BlockProgress {
   leftOut: number;
   /** Bytes of memory that the blocks take. */
   bytes: number;
+  /** Blocks that meshes needed although the file's index says that they cannot: 0 for every sound file. */
+  missed: number;
 }
 
 /** What is known of a volume as soon as it is open. */

@@ -5,6 +5,10 @@
 #[path = "../../tests/support/surfaces.rs"]
 mod surfaces;
 
+// What requests cost over a network, in the time of that.
+#[path = "../../tests/support/network.rs"]
+mod network;
+
 mod mt_file;
 mod requests;
 mod sets;

@@ -2,16 +2,16 @@
 
 use super::Result;
 use super::mt_file::mt_file;
+use super::network::{Network, Visitor};
 use super::sets::Set;
 use super::surfaces::{Interpolant, Mesh, Surface};
 use std::io::Cursor;
-use std::time::Duration;
 use tetralod::format::DecodeOptions;
 use tetralod::geom::Bounds;
-use tetralod::mt::MtKind;
+use tetralod::mt::{FieldInfo, MtKind};
 use tetralod::refine::{Need, RefineStats, Request};
 use tetralod::session::{Client, Session};
-use tetralod::stream::FileSource;
+use tetralod::stream::{FileSource, LoaderOptions};
 use tetralod_build::Purpose;
 
 /// Fewest tetrahedra of a set whose first picture is measured.
@@ -30,7 +30,7 @@ type Reader = Client<FileSource<Cursor<Vec<u8>>>>;
 
 pub fn run(sets: &[Set]) -> Result<()> {
     let mut pictures = Vec::new();
-    let mut boxes = Vec::new();
+    let mut asked = Vec::new();
     for set in sets {
         for (name, purpose) in WAYS {
             let is_usual = purpose == Purpose::default();
@@ -44,7 +44,7 @@ pub fn run(sets: &[Set]) -> Result<()> {
             if is_usual && (LARGE..=HUGE).contains(&set.mesh.tets.len()) {
                 pictures.push(picture(set, &name, &file)?);
             }
-            boxes.extend(corners(set, &name, &file)?);
+            asked.extend(requests(set, &name, &file)?);
         }
     }
     println!(
@@ -52,10 +52,12 @@ pub fn run(sets: &[Set]) -> Result<()> {
     );
     println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
     pictures.iter().for_each(|row| println!("{row}"));
-    println!("\n## Boxes\n");
-    println!("| set | box | file fetched % | updates applied % | blocks fetched % | blocks | rounds |");
-    println!("|---|---|--:|--:|--:|--:|--:|");
-    boxes.iter().for_each(|row| println!("{row}"));
+    println!("\n## Over a network\n");
+    println!(
+        "| set | request | updates applied % | blocks fetched % | file sent % | rounds | requests | sent twice % | missed | s | whole file s |"
+    );
+    println!("|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    asked.iter().for_each(|row| println!("{row}"));
     Ok(())
 }
 
@@ -173,40 +175,53 @@ fn in_order(
 
 /// Boxes that meet the model: a name, where they begin and how long they are along each side, and the error inside.
 const BOXES: [(&str, f64, f64, f64); 5] = [
-    ("low", 0.1, 0.25, 0.0),
-    ("middle", 0.375, 0.25, 0.0),
-    ("high", 0.65, 0.25, 0.0),
-    ("middle, 1 %", 0.375, 0.25, 0.01),
-    ("corner, 1 %", 0.0, 0.05, 0.01),
+    ("box, low", 0.1, 0.25, 0.0),
+    ("box, middle", 0.375, 0.25, 0.0),
+    ("box, high", 0.65, 0.25, 0.0),
+    ("box, middle, 1 %", 0.375, 0.25, 0.01),
+    ("box, corner, 1 %", 0.0, 0.05, 0.01),
 ];
 
-/// What each of the boxes needs.
-fn corners(set: &Set, set_name: &str, file: &[u8]) -> Result<Vec<String>> {
+/// A link from afar: 20 Mbit/s on each connection.
+const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0 };
+
+fn asked(set: &Set, field: &FieldInfo) -> Vec<(&'static str, Request)> {
     let whole = Bounds::of(&set.mesh.positions);
     let at = |part: f64| [0, 1, 2].map(|i| whole.min[i] + part * (whole.max[i] - whole.min[i]));
-    let mut rows = Vec::new();
-    for (name, part, side, error) in BOXES {
+    let boxes = BOXES.map(|(name, part, side, error)| {
         let region = Bounds { min: at(part), max: at(part + side) };
-        let mut client = open(file)?;
-        client.request(&Need::within(error).inside(region).into())?;
-        let mut rounds = 0;
-        let stats = loop {
-            let before = client.session().fetched();
-            while !client.fetch(Duration::MAX)? {}
-            rounds += u32::from(client.session().fetched() > before);
-            let stats = client.step(Duration::ZERO, &mut |_| true)?;
-            if client.is_complete(&stats) {
-                break stats;
-            }
-        };
-        let updates = client.session().info().map_or(1, |info| info.updates.max(1));
-        let progress = client.session().block_progress();
+        (name, Need::within(error).inside(region).into())
+    });
+    let value = 0.5 * (field.min + field.max);
+    let surface = |error| Need::within(error).around(0, &[value]).into();
+    let others =
+        [("isosurface, 1 %", surface(0.01)), ("isosurface", surface(0.0)), ("1 %", Request::within(0.01))];
+    boxes.into_iter().chain(others).collect()
+}
+
+/// What each request needs, and costs over the network.
+fn requests(set: &Set, set_name: &str, file: &[u8]) -> Result<Vec<String>> {
+    let mut rows = Vec::new();
+    let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
+    let opened = visitor.open();
+    let info = visitor.session.info().ok_or("no MT")?.clone();
+    let whole = (NETWORK.latency_ms + file.len() as f64 / NETWORK.bytes_per_ms) / 1000.0;
+    for (name, request) in asked(set, &info.fields[0]) {
+        let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
+        visitor.open();
+        let cost = visitor.refine(&request)?;
+        let progress = visitor.session.block_progress();
+        let applied = visitor.stats.applied;
         rows.push(format!(
-            "| {set_name} | {name} | {:.1} | {:.1} | {:.1} | {} | {rounds} |",
-            percent_of(client.session().fetched(), file),
-            100.0 * f64::from(stats.applied) / f64::from(updates),
+            "| {set_name} | {name} | {:.1} | {:.1} | {:.1} | {} | {} | {:.1} | {} | {:.2} | {whole:.2} |",
+            100.0 * f64::from(applied) / f64::from(info.updates.max(1)),
             100.0 * f64::from(progress.here) / f64::from(progress.blocks.max(1)),
-            progress.blocks
+            percent_of(opened.bytes + cost.bytes, file),
+            opened.rounds + cost.rounds,
+            opened.requests + cost.requests,
+            percent_of(cost.repeated, file),
+            progress.missed,
+            opened.seconds + cost.seconds,
         ));
     }
     Ok(rows)

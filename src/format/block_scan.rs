@@ -5,7 +5,8 @@ use super::payload::histogram::Histograms;
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
 use crate::mt::{
-    ApplyUpdates, CurrentMesh, ErrorCode, Excess, Margins, MtFacts, UpdateId, apply_next, level_volumes,
+    ApplyUpdates, CurrentMesh, ErrorCode, Excess, Extent, Margins, MtFacts, Reaches, UpdateId, apply_next,
+    level_volumes,
 };
 
 /// What a run through an MT has found.
@@ -33,22 +34,21 @@ fn by_facts(mt: &impl Codec, facts: &MtFacts, options: &EncodeOptions) -> Result
     if let Some(excess) = excess {
         return Err(out_of_order(excess));
     }
-    let fields = mt.info().fields.len();
-    let block = |(block, &bounds): (usize, &[[i32; 3]; 2])| {
-        let updates = mt.page_updates(block as u32);
-        let largest = |f: usize| updates.clone().map(|u| mt.error_of_field(UpdateId(u), f)).max();
-        BlockInfo {
-            bounds,
-            errors: (0..fields).map(|f| largest(f).unwrap_or(ErrorCode::ZERO)).collect(),
-            ranges: facts.ranges[block * fields..][..fields].to_vec(),
-            lengths: Vec::new(),
-        }
-    };
     Ok(BlockScan {
-        blocks: facts.bounds.iter().enumerate().map(block).collect(),
+        blocks: blocks(mt, facts.reaches.clone()),
         reference: Vec::new(),
         histograms: options.histograms.then(|| Histograms::of(&facts.volumes)),
     })
+}
+
+/// What the index says of each page, given what it reaches.
+fn blocks(mt: &impl ApplyUpdates, reaches: Vec<Extent>) -> Vec<BlockInfo> {
+    let block = |(page, Extent { bounds, ranges }): (u32, Extent)| {
+        let largest = |f: usize| mt.page_updates(page).map(|u| mt.error_of_field(UpdateId(u), f)).max();
+        let errors = (0..ranges.len()).map(|f| largest(f).unwrap_or(ErrorCode::ZERO)).collect();
+        BlockInfo { lengths: Vec::new(), bounds, errors, ranges }
+    };
+    (0..).zip(reaches).map(block).collect()
 }
 
 fn out_of_order(Excess { update, parent, field, .. }: Excess) -> EncodeError {
@@ -60,10 +60,11 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
     mesh.make_room(mt.info());
     mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
-    let mut blocks = Vec::new();
-    for page in 0..mt.updates().div_ceil(1 << mt.page_bits()) {
-        blocks.push(scan_block(mt, &mut mesh, mt.page_updates(page), options, &mut margins)?);
+    let mut reaches = Reaches::default();
+    for u in (0..mt.updates()).map(UpdateId) {
+        scan(mt, &mut mesh, u, options, (&mut margins, &mut reaches))?;
     }
+    let reaches = reaches.of_pages(mt.page_bits(), mt.info().fields.len());
     mesh.compact();
     let histograms = options.histograms.then(|| Histograms::of(&level_volumes(mt.info(), &mesh)));
     // For exact values alone.
@@ -71,55 +72,38 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
     let mut reference: Vec<(u32, Vec<i32>)> =
         slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
     reference.sort_unstable();
-    Ok(BlockScan { blocks, reference, histograms })
+    Ok(BlockScan { blocks: blocks(mt, reaches), reference, histograms })
 }
 
-fn scan_block(
+/// Looks at the next update, and applies it.
+fn scan(
     mt: &impl ApplyUpdates,
     mesh: &mut CurrentMesh,
-    updates: std::ops::Range<u32>,
+    u: UpdateId,
     options: &EncodeOptions,
-    margins: &mut Margins,
-) -> Result<BlockInfo, EncodeError> {
-    let fields = mt.info().fields.len();
-    let mut block = BlockInfo {
-        bounds: [[i32::MAX; 3], [i32::MIN; 3]],
-        errors: vec![ErrorCode::ZERO; fields],
-        ranges: vec![[i32::MAX, i32::MIN]; fields],
-        lengths: Vec::new(),
-    };
-    for u in updates.map(UpdateId) {
-        for (f, error) in block.errors.iter_mut().enumerate() {
-            *error = (*error).max(mt.error_of_field(u, f));
-        }
-        let removed = mt.find_removed(mesh, u).map_err(EncodeError::Update)?;
-        if let Some(excess) = margins.check(mt, mesh, u, &removed)
-            && (excess.larger || options.check_margins)
-        {
-            return Err(out_of_order(excess));
-        }
-        widen(&mut block, mesh, &removed);
-        apply_next(mt, mesh, u).map_err(EncodeError::Update)?;
-        let inserted = mt.find_inserted(mesh, u).map_err(EncodeError::Update)?;
-        widen(&mut block, mesh, &inserted);
+    (margins, reaches): (&mut Margins, &mut Reaches),
+) -> Result<(), EncodeError> {
+    let removed = mt.find_removed(mesh, u).map_err(EncodeError::Update)?;
+    let (mut parents, mut beyond) = (Vec::new(), Vec::new());
+    margins.next(mt, mesh, &removed, &mut parents, &mut beyond);
+    let fault = margins.fault(u, &parents, &beyond, |u, field| mt.error_of_field(u, field));
+    if let Some(excess) = fault.filter(|excess| excess.larger || options.check_margins) {
+        return Err(out_of_order(excess));
     }
-    Ok(block)
+    let mut own = Extent::empty(mt.info().fields.len());
+    widen(&mut own, mesh, &removed);
+    apply_next(mt, mesh, u).map_err(EncodeError::Update)?;
+    let inserted = mt.find_inserted(mesh, u).map_err(EncodeError::Update)?;
+    widen(&mut own, mesh, &inserted);
+    reaches.push(own.bounds, &own.ranges, &parents);
+    Ok(())
 }
 
-/// Takes tetrahedra of the mesh into the bounds of a block.
-fn widen(block: &mut BlockInfo, mesh: &CurrentMesh, tets: &[u32]) {
+/// Takes tetrahedra of the mesh into an extent.
+fn widen(extent: &mut Extent, mesh: &CurrentMesh, tets: &[u32]) {
     let mut vertices: Vec<u32> = tets.iter().filter_map(|&t| mesh.tet(t)).flatten().collect();
     // Each is a corner of many.
     vertices.sort_unstable();
     vertices.dedup();
-    for v in vertices {
-        let position = mesh.positions()[v as usize];
-        let [low, high] = &mut block.bounds;
-        for ((low, high), x) in low.iter_mut().zip(high).zip(position) {
-            (*low, *high) = ((*low).min(x), (*high).max(x));
-        }
-        for (range, &level) in block.ranges.iter_mut().zip(mesh.levels(v)) {
-            *range = [range[0].min(level), range[1].max(level)];
-        }
-    }
+    vertices.into_iter().for_each(|v| extent.add(mesh.positions()[v as usize], mesh.levels(v)));
 }

@@ -1,8 +1,8 @@
 //! What is known of an MT once all of its updates have been applied, so that it need not be found out again.
 //!
-//! A builder of half-edge MTs notes bounds, ranges and faults of the errors of its pages, and what the encoder asks of the reference mesh.
+//! A builder of half-edge MTs notes what its pages reach, the faults of errors, and what the encoder asks of the reference mesh.
 
-use super::{CurrentMesh, Excess, MtInfo};
+use super::{CurrentMesh, Excess, Extent, MtInfo};
 use crate::mesh::Histogram;
 use crate::threads;
 
@@ -12,10 +12,8 @@ pub(crate) const VOLUME_BINS: usize = 64;
 /// What is known of an MT from having applied all of its updates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct MtFacts {
-    /// Page by page, a box that holds all tetrahedra that its updates remove or insert: least and largest corner.
-    pub bounds: Vec<[[i32; 3]; 2]>,
-    /// Page by page and field by field, the least and the largest level in these.
-    pub ranges: Vec<[i32; 2]>,
+    /// What each page reaches.
+    pub reaches: Vec<Extent>,
     /// The first update whose error is larger than that of a parent.
     pub larger: Option<Excess>,
     /// The first whose error is too large by [`Margins`](super::Margins).
@@ -25,20 +23,6 @@ pub(crate) struct MtFacts {
 }
 
 impl MtFacts {
-    /// Takes a vertex of what an update of `page` removes or inserts into what is known of the page.
-    pub fn widen(&mut self, page: usize, [low, high]: [[i32; 3]; 2], ranges: &[[i32; 2]]) {
-        if page >= self.bounds.len() {
-            self.bounds.resize(page + 1, [[i32::MAX; 3], [i32::MIN; 3]]);
-            self.ranges.resize((page + 1) * ranges.len(), [i32::MAX, i32::MIN]);
-        }
-        let [lowest, highest] = &mut self.bounds[page];
-        (0..3).for_each(|k| lowest[k] = lowest[k].min(low[k]));
-        (0..3).for_each(|k| highest[k] = highest[k].max(high[k]));
-        for (all, [low, high]) in self.ranges[page * ranges.len()..].iter_mut().zip(ranges) {
-            *all = [all[0].min(*low), all[1].max(*high)];
-        }
-    }
-
     /// Takes the fault of an update, which comes after those before.
     pub fn note(&mut self, excess: Excess) {
         self.larger = self.larger.or(Some(excess).filter(|excess| excess.larger));
@@ -48,8 +32,8 @@ impl MtFacts {
     /// Bytes in memory.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()
-            + size_of_val(&self.bounds[..])
-            + size_of_val(&self.ranges[..])
+            + size_of_val(&self.reaches[..])
+            + self.reaches.iter().map(|extent| size_of_val(&extent.ranges[..])).sum::<usize>()
             + size_of_val(&self.volumes[..])
     }
 }

@@ -20,6 +20,7 @@
 //! | `explicit` | `store`, `face_occupancy`, `check`, `apply` |
 //! | `any` | [`Mt`], an MT of any kind; calls are dispatched by `enum_dispatch` |
 //! | `facts` | what is noted of a half-edge MT while it is made, for the encoder |
+//! | `reaches` | what updates and all that depend on them touch |
 //! | `convert`, `replay`, `stats`, `update_errors`, `exact`, `margins`, `ranks`, `error` | over all kinds |
 //!
 //! [`EdgeMt`] stores no DAG: parents and children follow from labels. In [`VertexMt`] and [`VertexTreeMt`] they follow from loops [§5]; these store
@@ -44,6 +45,7 @@ mod margins;
 mod mesh;
 mod pages;
 mod ranks;
+mod reaches;
 mod replay;
 mod stats;
 mod update_errors;
@@ -94,6 +96,7 @@ pub use mesh::limits::{MAX_LINK, MAX_STAR};
 pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
 pub(crate) use pages::updates_of_page;
+pub(crate) use reaches::{Extent, Reaches};
 #[doc(hidden)]
 pub use replay::ReplayError;
 pub(crate) use replay::apply_next;

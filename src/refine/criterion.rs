@@ -27,6 +27,36 @@ impl TetData<'_> {
     }
 }
 
+/// A block of updates as criteria see it, by what the index of a file says: what its updates, and all that depend on them, can be like.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockData<'a> {
+    /// A box on the lattice that holds every tetrahedron that one of them removes: its least and its largest corner.
+    pub bounds: [[i32; 3]; 2],
+    /// Field by field, the least and the largest level in these.
+    pub ranges: &'a [[i32; 2]],
+    /// Field by field, their largest error.
+    pub errors: &'a [ErrorCode],
+    /// The first update of the block.
+    pub first: UpdateId,
+}
+
+impl BlockData<'_> {
+    /// The box as six tetrahedra, one for each order of the axes: each goes from the least to the largest corner along its edges.
+    pub fn tets(&self) -> [[[i32; 3]; 4]; 6] {
+        const ORDERS: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [1, 0], [2, 1], [0, 2]];
+        let [low, high] = self.bounds;
+        std::array::from_fn(|i| {
+            let [first, second] = ORDERS[i];
+            let mut one = low;
+            one[first] = high[first];
+            let mut two = one;
+            two[second] = high[second];
+            // The second half of the orders turns the other way.
+            if i < 3 { [low, one, two, high] } else { [low, two, one, high] }
+        })
+    }
+}
+
 /// The result of a criterion for a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
@@ -94,6 +124,14 @@ pub trait Criterion: Any + fmt::Debug + Send + Sync {
     /// [batched](Criterion::is_batched).
     fn judge_all(&self, tets: &[TetData<'_>]) -> Vec<Verdict> {
         tets.iter().map(|tet| self.judge(tet)).collect()
+    }
+
+    /// Whether a tetrahedron that is removed by an update of the block, or by one that depends on it, can violate the criterion: if not,
+    /// the block need not be fetched. None if the criterion cannot tell from blocks; then what is needed shows as the mesh is refined, with
+    /// one wait after the other.
+    fn may_need(&self, block: &BlockData<'_>) -> Option<bool> {
+        let _ = block;
+        None
     }
 
     /// Whether evaluating many tetrahedra at once is much cheaper than one by one.

@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::criterion::{
-    ANY, Criterion, PLANE_COMPONENTS, PLANES, TOLERANCE, TetData, Tolerance, Verdict, component_of,
+    ANY, BlockData, Criterion, PLANE_COMPONENTS, PLANES, TOLERANCE, TetData, Tolerance, Verdict, component_of,
 };
 use super::frame::Frame;
 use super::palette::Palette;
@@ -156,6 +156,27 @@ impl Criterion for LodCriterion {
             verdicts.iter_mut().zip(custom.judge_all(tets)).for_each(|(all, one)| *all = all.or(one));
         }
         verdicts
+    }
+
+    /// What holds for a tetrahedron holds for one of those that fill the block's box, with its largest error and all of its levels: every
+    /// measure asks for a point where some function is small enough, and is the looser the larger the error.
+    fn may_need(&self, block: &BlockData<'_>) -> Option<bool> {
+        let levels =
+            |field: usize| block.ranges.get(field).map_or([0; 4], |&[low, high]| [low, high, low, high]);
+        let error = block.errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
+        let asks = |corners: [[i32; 3]; 4]| {
+            let tet = TetData {
+                corners: &corners,
+                levels: &levels,
+                error,
+                errors: block.errors,
+                update: block.first,
+            };
+            let placed = self.frame.place(&corners);
+            self.atoms.iter().any(|atom| atom.judge(&self.frame, &tet, &placed, false).violates())
+        };
+        let custom: Option<Vec<bool>> = self.custom.iter().map(|custom| custom.may_need(block)).collect();
+        custom.map(|custom| custom.contains(&true) || block.tets().into_iter().any(asks))
     }
 
     fn is_batched(&self) -> bool {

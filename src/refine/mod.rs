@@ -67,7 +67,7 @@ mod uniform;
 
 #[doc(hidden)]
 pub use criterion::{ANY, COMPONENTS, Tolerance};
-pub use criterion::{Criterion, TetData, Verdict};
+pub use criterion::{BlockData, Criterion, TetData, Verdict};
 #[doc(hidden)]
 pub use custom::Custom;
 #[doc(hidden)]

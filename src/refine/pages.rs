@@ -115,6 +115,18 @@ impl Front {
         largest.map(|&demand| ((demand >> 64) as u32, f64::from_bits(demand as u64))).collect()
     }
 
+    /// The largest excess of a tetrahedron whose remover is present; 1 if none violates the criterion. Under a budget, what has a smaller
+    /// excess does not come before it.
+    pub fn largest_present_excess(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> f64 {
+        let tets = (0..).zip(self.mesh.tets());
+        let removed = tets.filter_map(|(t, tet)| Some((t, tet, mt.remover(&self.mesh, t)?)));
+        let excesses = removed.map(|(t, tet, u)| {
+            let errors = TetErrors::of(mt, &self.mesh, t, u);
+            see(&self.mesh, tet, &errors, u, |look| criterion.rank(look)).excess
+        });
+        excesses.fold(1.0, f64::max)
+    }
+
     /// The present pages with the remover of a tetrahedron that may violate the criterion by the `bounds` of the page:
     /// without them it would be unknown whether the mesh satisfies the request. Some are listed several times.
     pub fn decisive_pages(

@@ -1,6 +1,8 @@
 //! What a session has of the blocks of a file elsewhere, and what it plans to have.
 
-use crate::refine::Criterion;
+use crate::mt::ErrorCode;
+use crate::refine::{Budget, Criterion};
+use crate::stream::RangeSet;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -17,8 +19,8 @@ pub(super) struct Blocks {
     pub fed: u64,
     /// Bytes that have come, those that came again counted again.
     pub fetched: u64,
-    /// What has come, in ascending order; no two of these meet.
-    pub arrived: Vec<Range<u64>>,
+    /// What has come.
+    pub arrived: RangeSet,
     /// What has come of blocks that are not complete, by where it begins.
     pub pieces: BTreeMap<u64, Vec<u8>>,
     /// The beginning of a range of a block, and where that begins: it came with what stands in front of the blocks.
@@ -32,8 +34,14 @@ pub(super) struct Blocks {
     /// The number of the plan in which each block was needed last.
     pub last_needed: Vec<u32>,
     pub plans: u32,
-    /// The criterion of the request.
+    /// The criterion of the request, and its budget.
     pub criterion: Option<Arc<dyn Criterion>>,
+    pub budget: Budget,
+    /// Which blocks the request can need by what the index says that they reach, the largest errors first; none if its criterion cannot
+    /// tell.
+    pub reached: Option<Vec<(ErrorCode, u32)>>,
+    /// Blocks that a mesh needed all the same.
+    pub missed: u32,
 }
 
 impl Blocks {
@@ -44,21 +52,13 @@ impl Blocks {
 
     /// Notes that so many bytes have come from `start` on.
     pub fn arrive(&mut self, start: u64, bytes: usize) {
-        if bytes == 0 {
-            return;
-        }
         self.fetched += bytes as u64;
-        let new = start..start.saturating_add(bytes as u64);
-        let first = self.arrived.partition_point(|range| range.end < new.start);
-        let behind = self.arrived.partition_point(|range| range.start <= new.end);
-        let meets = self.arrived[first..behind].iter();
-        let whole = meets.fold(new, |whole, range| whole.start.min(range.start)..whole.end.max(range.end));
-        self.arrived.splice(first..behind, [whole]);
+        self.arrived.insert(&(start..start.saturating_add(bytes as u64)));
     }
 
     /// Bytes that have come, each counted once.
     pub fn arrived_bytes(&self) -> u64 {
-        self.arrived.iter().map(|range| range.end - range.start).sum()
+        self.arrived.len()
     }
 
     /// Bytes of what waits to be put together.

@@ -6,12 +6,13 @@
 
 use super::Session;
 use super::block_state::Blocks;
-use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index};
+use crate::format::{BlockInfo, DecodeOptions, Decoder, ErrorBytes, FormatError, Index};
 use crate::geom::Bounds;
-use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
-use crate::refine::{Criterion, Front};
+use crate::mt::{ErrorCode, Mt, MtInfo, MultiTessellation, UpdateId, UpdatePages};
+use crate::refine::{BlockData, Budget, Criterion, Front};
 use crate::stream::{Loader, WantedRange};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// How a session that keeps blocks stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,6 +27,8 @@ pub struct BlockProgress {
     pub left_out: u32,
     /// Bytes in memory of the blocks that are here, and of what waits to be put together.
     pub bytes: u64,
+    /// Blocks that meshes needed although the index says that they cannot: always 0, unless the file or the planner is wrong.
+    pub missed: u32,
 }
 
 /// A block of the file, in space.
@@ -180,7 +183,7 @@ impl Session {
                 self.feed(bytes)?;
                 let head = self.decoder.head_end().filter(|_| self.decoder.takes_blocks());
                 self.blocks.fed = head.map_or(end, |head| head.max(start));
-                self.plan();
+                self.plan(true);
                 self.take_surplus(start, bytes)?;
             }
             return Ok(());
@@ -270,6 +273,7 @@ impl Session {
             needed: blocks.needed,
             left_out: blocks.left_out + without_memory,
             bytes: blocks.bytes_beside() + mt.page_bytes(),
+            missed: blocks.missed,
         }
     }
 
@@ -293,8 +297,41 @@ impl Session {
         blocks.map(|(block, info)| MappedBlock { bounds: bounds(info.bounds), state: state(block) }).collect()
     }
 
-    /// Works out which blocks the request needs.
-    fn plan(&mut self) {
+    /// Notes the criterion and the budget of a new request, and works out which blocks it needs as far as the index tells.
+    pub(super) fn new_request(&mut self, criterion: Arc<dyn Criterion>, budget: Budget) {
+        let fields = self.decoder.wanted_fields();
+        let described = self.decoder.index().zip(self.decoder.info());
+        let reached = described.and_then(|(index, info)| reached(&*criterion, index, info, fields));
+        let blocks = &mut self.blocks;
+        (blocks.reached, blocks.criterion, blocks.budget) = (reached, Some(criterion), budget);
+        if blocks.in_parts && self.plan_by_index().is_some() {
+            self.plan(false);
+        }
+    }
+
+    /// The blocks that the request can need by what the index says that they reach, with their priorities: of a request with a budget, as
+    /// many as that has room for. None if the criterion cannot tell, or if all of them do not fit the memory; then what there is of it is for
+    /// what the mesh asks for.
+    fn plan_by_index(&self) -> Option<Vec<(f64, u32)>> {
+        let (index, mt, blocks) = (self.decoder.index()?, self.decoder.mt()?, &self.blocks);
+        let affordable = updates_within(&blocks.budget, mt);
+        let mut updates = 0;
+        let is_affordable = |&&(_, block): &&(ErrorCode, u32)| {
+            updates += index.updates(block, mt.info().updates).len() as u64;
+            affordable.is_none_or(|most| updates <= most)
+        };
+        let plan: Vec<(f64, u32)> = (blocks.reached.as_ref()?.iter().take_while(is_affordable))
+            .map(|&(error, block)| {
+                (priority(f64::INFINITY, &[error], index.blocks[block as usize].len()), block)
+            })
+            .collect();
+        let bytes: u64 = plan.iter().map(|&(_, block)| mt.bytes_of_page(block)).sum();
+        (bytes <= blocks.memory).then_some(plan)
+    }
+
+    /// Works out which blocks the request needs; by the mesh, too, if that was made for the request.
+    fn plan(&mut self, mesh_has_moved: bool) {
+        let by_index = self.plan_by_index();
         let (blocks, Some(index), Some(mt)) = (&mut self.blocks, self.decoder.index(), self.decoder.mt())
         else {
             return;
@@ -303,7 +340,18 @@ impl Session {
         blocks.plans += 1;
         blocks.last_needed.resize(index.blocks.len(), 0);
         let fields = self.decoder.wanted_fields();
-        let mut plan = plan_by_mesh(front, mt, &**criterion, index, fields);
+        let is_exhaustive = by_index.is_some() && blocks.budget.is_unlimited();
+        let mut plan = by_index.unwrap_or_default();
+        if mesh_has_moved && plan.iter().all(|&(_, block)| mt.has_page(block)) {
+            let mut is_planned = vec![false; index.blocks.len()];
+            plan.iter().for_each(|&(_, block)| is_planned[block as usize] = true);
+            let asked = plan_by_mesh(front, mt, &**criterion, &blocks.budget, index, fields);
+            let more = asked.into_iter().filter(|&(_, block)| !is_planned[block as usize]);
+            let known = plan.len();
+            plan.extend(more);
+            // The index has promised that there are none.
+            blocks.missed += if is_exhaustive { (plan.len() - known) as u32 } else { 0 };
+        }
         plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
         // The most important ones first; those as important as they are in the file.
         plan.sort_by(|(priority, block), (other, after)| other.total_cmp(priority).then(block.cmp(after)));
@@ -330,7 +378,7 @@ impl Session {
     pub(super) fn after_step(&mut self) -> Result<(), FormatError> {
         if self.blocks.in_parts {
             // The mesh shows now what else it needs.
-            self.plan();
+            self.plan(true);
             self.free_memory();
             self.insert_waiting()?;
         }
@@ -417,15 +465,50 @@ fn priority(excess: f64, errors: &[ErrorCode], bytes: u64) -> f64 {
     gain / bytes as f64
 }
 
-/// The blocks that are here and in use, and those that hold what tetrahedra of the mesh ask for.
+/// Of a file with this index, the blocks that a criterion can need by what they reach, the largest errors first; none if it cannot tell.
+fn reached(
+    criterion: &dyn Criterion,
+    index: &Index,
+    info: &MtInfo,
+    fields: &[usize],
+) -> Option<Vec<(ErrorCode, u32)>> {
+    let mut needed = Vec::new();
+    for block in 0..index.blocks.len() as u32 {
+        let errors = errors_of(index, fields, block);
+        let BlockInfo { bounds, ranges, .. } = &index.blocks[block as usize];
+        let ranges: Vec<[i32; 2]> = fields.iter().map(|&f| ranges[f]).collect();
+        let first = UpdateId(index.updates(block, info.updates).start);
+        if criterion.may_need(&BlockData { bounds: *bounds, ranges: &ranges, errors: &errors, first })? {
+            needed.push((errors.into_iter().max().unwrap_or(ErrorCode::ZERO), block));
+        }
+    }
+    needed.sort_by(|(error, block), (other, after)| other.cmp(error).then(block.cmp(after)));
+    Some(needed)
+}
+
+/// About twice as many updates as a budget has room for: of the blocks with the largest errors, not all are applied.
+fn updates_within(budget: &Budget, mt: &Mt) -> Option<u64> {
+    let (info, base) = (mt.info(), mt.base());
+    let new = |all: u32, base: usize| f64::from(all) - base as f64;
+    let growth = new(info.tetrahedra, base.tets.len()) / f64::from(info.updates.max(1));
+    let of_tets = budget.tets.map(|tets| new(tets, base.tets.len()) / growth);
+    let of_vertices = budget.vertices.map(|vertices| new(vertices, base.positions.len()));
+    let of_bytes = budget.bytes.map(|bytes| bytes as f64 / (32.0 * growth + 16.0));
+    let limits = [of_tets, of_vertices, of_bytes].into_iter().flatten();
+    limits.reduce(f64::min).map(|updates| (2.0 * updates).max(0.0) as u64)
+}
+
+/// The blocks that hold what tetrahedra of the mesh ask for; of a criterion that is the same everywhere, without a budget, those with larger
+/// errors.
 fn plan_by_mesh(
     front: &Front,
     mt: &Mt,
     criterion: &dyn Criterion,
+    budget: &Budget,
     index: &Index,
     fields: &[usize],
 ) -> Vec<(f64, u32)> {
-    if let Some(tolerances) = criterion.uniform() {
+    if let Some(tolerances) = criterion.uniform().filter(|_| budget.is_unlimited()) {
         let asks = |errors: &[ErrorCode]| {
             tolerances.iter().any(|tolerance| match tolerance.field {
                 Some(field) => errors.get(field).is_some_and(|&error| error > tolerance.error),
@@ -441,7 +524,11 @@ fn plan_by_mesh(
             .collect();
     }
     let demanded = front.demanded_pages(mt, criterion, |u| u.0 >> index.block_bits);
-    let known = demanded.into_iter().filter(|(block, _)| (*block as usize) < index.blocks.len());
+    // Under a budget, what is here comes first if it exceeds its error by more.
+    let least = if budget.is_unlimited() { 1.0 } else { front.largest_present_excess(mt, criterion) };
+    let known = demanded
+        .into_iter()
+        .filter(|&(block, excess)| (block as usize) < index.blocks.len() && excess >= least);
     known
         .map(|(block, excess)| {
             (priority(excess, &errors_of(index, fields, block), index.blocks[block as usize].len()), block)

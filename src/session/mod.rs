@@ -228,8 +228,7 @@ impl Session {
         let criterion: Arc<dyn Criterion> = Arc::new(criterion);
         front.request(mt, Arc::clone(&criterion), request.budget);
         self.request.clone_from(request);
-        // What it needs is worked out when the mesh has moved: what a mesh that was made for another request asks for may not be needed.
-        self.blocks.criterion = Some(criterion);
+        self.new_request(criterion, request.budget);
         Ok(())
     }
 

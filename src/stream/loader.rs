@@ -13,8 +13,10 @@ use std::ops::Range;
 pub struct LoaderOptions {
     /// Most requests at a time.
     pub max_requests: usize,
-    /// Unwanted bytes that are rather fetched than asked around.
+    /// Unwanted bytes that are rather fetched than asked around; they are kept, for they may be wanted later.
     pub gap: u64,
+    /// Most unwanted bytes that are kept.
+    pub spare_bytes: u64,
     /// Most bytes in one request.
     pub max_request_bytes: u64,
     /// How often the same bytes are asked for again without success.
@@ -30,11 +32,13 @@ pub struct LoaderOptions {
 }
 
 impl Default for LoaderOptions {
-    /// Six requests of up to 4 MiB over gaps of up to 16 KiB; five more tries, after 0.5 s to 10 s; 30 s of silence.
+    /// Six requests of up to 4 MiB over gaps of up to 16 KiB, of which 32 MiB are kept; five more tries, after 0.5 s to 10 s; 30 s of
+    /// silence.
     fn default() -> Self {
         Self {
             max_requests: 6,
             gap: 16 << 10,
+            spare_bytes: 32 << 20,
             max_request_bytes: 4 << 20,
             retries: 5,
             backoff_ms: 500,
@@ -103,8 +107,10 @@ pub struct Traffic {
     pub requests: u64,
     /// Bytes that came.
     pub received: u64,
-    /// Of those, bytes that were wanted.
+    /// Of those, bytes that were wanted when they came.
     pub used: u64,
+    /// Bytes that had come before, and came again.
+    pub repeated: u64,
 }
 
 /// Decides which bytes of a file to ask for next, and takes what comes.
@@ -113,7 +119,7 @@ pub struct Traffic {
 /// serves pages, programs and tests, and every fault of a network can be played to it. What it holds to: the bytes
 /// that come out are those of one version of the file; never more than
 /// [`max_requests`](LoaderOptions::max_requests) requests are open or waiting to be tried again; no byte is asked for
-/// that is held or on its way; nobody waits for ever: in the end there are bytes or a [`StreamError`].
+/// that is held or on its way, and none that has come before unless it is wanted again; nobody waits for ever: in the end there are bytes or a [`StreamError`].
 #[derive(Debug, Default)]
 pub struct Loader {
     options: LoaderOptions,
@@ -121,8 +127,10 @@ pub struct Loader {
     wanted: Vec<WantedRange>,
     /// Bytes of `wanted` that are not held.
     needed: RangeSet,
-    /// Bytes of `wanted` that are.
+    /// Bytes of `wanted` that are, and others that have come with them.
     reassembly: Reassembly,
+    /// Bytes that have come, of this version of the file.
+    came: RangeSet,
     ready: VecDeque<(Range<u64>, Vec<u8>)>,
     /// Ranges that a cache has, and those of them that are being read.
     cached: HashSet<Range<u64>>,
@@ -219,12 +227,11 @@ impl Loader {
         self.wanted = wanted.to_vec();
         let ready = &self.ready;
         self.wanted.retain(|wanted| ready.iter().all(|(range, _)| *range != wanted.range));
-        let all = self.all_wanted();
-        self.reassembly.keep(&all);
-        self.needed = all;
+        self.needed = self.all_wanted();
         for range in self.reassembly.ranges() {
             self.needed.remove(&range);
         }
+        self.drop_spare();
         self.deliver(&(0..UNKNOWN));
     }
 
@@ -295,6 +302,7 @@ impl Loader {
         request.body.start += taken as u64;
         let chunk = start..request.body.start;
         let done = request.body.start == request.body.end;
+        self.traffic.repeated += taken as u64 - self.unseen(&chunk).len();
         let used = self.store(&chunk, &bytes[..taken]);
         self.requests[at].used += used;
         self.traffic.used += used;
@@ -395,6 +403,7 @@ impl Loader {
         if self.error.take() == Some(StreamError::Changed) {
             self.file = Version::default();
             self.reassembly = Reassembly::default();
+            self.came = RangeSet::default();
             self.needed = self.all_wanted();
         }
     }
@@ -446,17 +455,51 @@ impl Loader {
         RangeSet::of(self.wanted.iter().map(|wanted| self.file.clip(&wanted.range)).collect())
     }
 
-    /// Keeps of `chunk` what is wanted and not held; says how much that is.
+    /// Keeps of `chunk` what is wanted and not held, and what has not come before; says how much was wanted.
     fn store(&mut self, chunk: &Range<u64>, bytes: &[u8]) -> u64 {
+        let mut new = self.unseen(chunk);
+        self.came.insert(chunk);
+        // The whole file is not kept by the way.
+        if self.ranges == Some(false) {
+            new = RangeSet::default();
+        }
         let (mut rest, mut used) = (chunk.clone(), 0);
         while let Some(part) = self.needed.first_in(&rest) {
-            let place = |at: u64| (at - chunk.start) as usize;
-            self.reassembly.put(part.start, &bytes[place(part.start)..place(part.end)]);
             self.needed.remove(&part);
+            new.insert(&part);
             used += part.end - part.start;
             rest.start = part.end;
         }
+        for part in new.iter() {
+            let place = |at: u64| (at - chunk.start) as usize;
+            self.reassembly.put(part.start, &bytes[place(part.start)..place(part.end)]);
+        }
+        self.drop_spare();
         used
+    }
+
+    /// What of a chunk has not come before.
+    fn unseen(&self, chunk: &Range<u64>) -> RangeSet {
+        let mut new = RangeSet::of(vec![chunk.clone()]);
+        self.came.iter().for_each(|range| new.remove(range));
+        new
+    }
+
+    /// Drops bytes that are not wanted, if there are too many.
+    fn drop_spare(&mut self) {
+        // Without those that are not wanted, no more than what is wanted is held.
+        if self.reassembly.len() <= self.options.spare_bytes {
+            return;
+        }
+        let all = self.all_wanted();
+        let held = self.reassembly.ranges().map(|range| {
+            let mut spare = RangeSet::of(vec![range]);
+            all.iter().for_each(|wanted| spare.remove(wanted));
+            spare.len()
+        });
+        if held.sum::<u64>() > self.options.spare_bytes {
+            self.reassembly.keep(&all);
+        }
     }
 
     /// Hands out what is complete now that the bytes of `touched` are there or known not to exist.
@@ -607,7 +650,7 @@ impl Loader {
             .chain(self.reading.iter().cloned())
     }
 
-    /// The range from `start` over what is free, and over gaps that are small and not held or on their way.
+    /// The range from `start` over what is free, and over gaps that are small, not on their way, and have not come before.
     ///
     /// It grows forwards alone: what is before the most important bytes would come before them.
     fn grown(&self, start: u64, free: &RangeSet) -> Range<u64> {
@@ -624,8 +667,8 @@ impl Loader {
     }
 
     fn is_busy(&self, gap: &Range<u64>) -> bool {
-        let mut busy = self.reassembly.ranges().chain(self.under_way());
-        busy.any(|range| range.start < gap.end && gap.start < range.end)
+        let mut busy = self.under_way();
+        self.came.first_in(gap).is_some() || busy.any(|range| range.start < gap.end && gap.start < range.end)
     }
 
     fn fetch(&mut self, range: Range<u64>, strikes: u32, now: u64) -> Action {

@@ -24,6 +24,24 @@ impl RangeSet {
         Self { ranges }
     }
 
+    /// Takes the bytes of `range` in.
+    pub fn insert(&mut self, range: &Range<u64>) {
+        if range.start >= range.end {
+            return;
+        }
+        let first = self.ranges.partition_point(|found| found.end < range.start);
+        let behind = self.ranges.partition_point(|found| found.start <= range.end);
+        let meets = self.ranges[first..behind].iter();
+        let whole =
+            meets.fold(range.clone(), |all, found| all.start.min(found.start)..all.end.max(found.end));
+        self.ranges.splice(first..behind, [whole]);
+    }
+
+    /// How many bytes are in it.
+    pub fn len(&self) -> u64 {
+        self.ranges.iter().map(|range| range.end - range.start).sum()
+    }
+
     /// Takes the bytes of `range` out.
     pub fn remove(&mut self, range: &Range<u64>) {
         if range.start >= range.end {

@@ -6,6 +6,7 @@ mod client;
 mod curve;
 mod hostile;
 mod kinds;
+mod network;
 mod parts;
 mod quantity;
 mod states;

@@ -22,7 +22,13 @@ fn wanted(range: Range<u64>, priority: f32) -> WantedRange {
 }
 
 fn small() -> LoaderOptions {
-    LoaderOptions { max_requests: 3, gap: 20, max_request_bytes: 300, ..LoaderOptions::default() }
+    LoaderOptions {
+        max_requests: 3,
+        gap: 20,
+        spare_bytes: 0,
+        max_request_bytes: 300,
+        ..LoaderOptions::default()
+    }
 }
 
 /// What to answer to a request.
@@ -309,7 +315,8 @@ proptest! {
         max_request_bytes in 1u64..900,
         chosen in prop::collection::vec(0..FAULTS.len(), 1..5),
     ) {
-        let options = LoaderOptions { max_requests, gap, max_request_bytes, seed, ..LoaderOptions::default() };
+        let limits = LoaderOptions { max_requests, gap, max_request_bytes, seed, ..LoaderOptions::default() };
+        let options = LoaderOptions { spare_bytes: 0, ..limits };
         let mut world = World::new(seed, options);
         let faults: Vec<Fault> = chosen.into_iter().map(|at| FAULTS[at]).collect();
         for _ in 0..6 {

@@ -10,6 +10,7 @@ pub mod data;
 pub mod domains;
 pub mod files;
 pub mod meshes;
+pub mod network;
 pub mod oracle;
 pub mod random;
 pub mod requests;

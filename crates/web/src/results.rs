@@ -50,10 +50,10 @@ pub fn progress(progress: &Progress) -> JsProgress {
 
 /// How the blocks stand, for JavaScript.
 pub fn blocks(progress: &BlockProgress) -> JsBlocks {
-    let BlockProgress { blocks, here, needed, left_out, bytes } = *progress;
-    let counts = [blocks, here, needed, left_out].map(f64::from);
-    let [all, here, needed, left_out] = counts;
-    record(&["all", "here", "needed", "leftOut", "bytes"], &[all, here, needed, left_out, bytes as f64])
+    let BlockProgress { blocks, here, needed, left_out, bytes, missed } = *progress;
+    let [all, here, needed, left_out, missed] = [blocks, here, needed, left_out, missed].map(f64::from);
+    let names = ["all", "here", "needed", "leftOut", "bytes", "missed"];
+    record(&names, &[all, here, needed, left_out, bytes as f64, missed])
 }
 
 /// What is known of the MT of a session, for JavaScript.

@@ -11,12 +11,12 @@ use std::ops::Range;
 pub struct BlockInfo {
     /// Bytes of its sections, heads included: what all fields share, then field by field.
     pub lengths: Vec<u32>,
-    /// A box on the lattice that holds all tetrahedra that its updates remove or insert: least and largest corner.
+    /// A box on the lattice that holds all tetrahedra that its updates, and all that depend on them, remove or insert: least and
+    /// largest corner.
     pub bounds: [[i32; 3]; 2],
-    /// For each field the largest error of its updates, or a little more.
+    /// For each field the largest error of its updates, or a little more: what depends on them has no larger one.
     pub errors: Vec<ErrorCode>,
-    /// For each field the least and the largest level in the tetrahedra that its updates remove or insert, or a little
-    /// less and more.
+    /// For each field the least and the largest level in these tetrahedra, or a little less and more.
     pub ranges: Vec<[i32; 2]>,
 }
 

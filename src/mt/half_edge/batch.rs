@@ -8,6 +8,7 @@ use super::scratch::{NEW, NewTet, Scratch, is_positive, predict_levels};
 use super::star_code::StarCode;
 use super::store::{HalfEdgeMt, HalfEdgeUpdate};
 use crate::mt::facts::MtFacts;
+use crate::mt::reaches::Reaches;
 use crate::mt::{
     Applied, ConvertError, CurrentMesh, ErrorCode, Excess, Margins, MultiTessellation, UpdateError, UpdateId,
     VertexId,
@@ -58,6 +59,9 @@ struct Coded {
     /// The box around each star, and its ranges of levels, field by field.
     bounds: Vec<[[i32; 3]; 2]>,
     ranges: Vec<[i32; 2]>,
+    /// What each depends on, and where those of each end.
+    parents: Vec<UpdateId>,
+    parent_ends: Vec<usize>,
     faults: Vec<Excess>,
     /// Why the next one has no code.
     failed: Option<ConvertError>,
@@ -81,18 +85,20 @@ impl Coded {
             residuals: vec![0; updates * fields],
             bounds: Vec::with_capacity(updates),
             ranges: Vec::with_capacity(updates * fields),
+            parents: Vec::new(),
+            parent_ends: Vec::with_capacity(updates),
             faults: Vec::new(),
             failed: None,
         }
     }
 
-    /// Adds the code of a star, which is the `at`-th, and what its page is to know of it.
+    /// Adds the code of a star, which is the `at`-th, and what its page is to know of it; its parents are in the scratch space.
     fn push(
         &mut self,
         at: usize,
         star: &TakenStar<'_>,
         forest: &Forest,
-        CodeScratch { code, star: tets, .. }: &mut CodeScratch,
+        CodeScratch { code, star: tets, parents, .. }: &mut CodeScratch,
     ) -> Result<(), ConvertError> {
         let update = star.update.0;
         if !is_positive(star.tets, star.positions(), star.position) {
@@ -107,6 +113,8 @@ impl Coded {
         self.ends.push(self.stars.len());
         self.bounds.push(star.bounds());
         self.ranges.extend(star.ranges());
+        self.parents.extend_from_slice(parents);
+        self.parent_ends.push(self.parents.len());
         Ok(())
     }
 }
@@ -372,7 +380,7 @@ impl Batch {
         coded: CodedBatch,
         mt: &mut HalfEdgeMt,
         forest: &Forest,
-        facts: &mut MtFacts,
+        (facts, reaches): (&mut MtFacts, &mut Reaches),
     ) -> Result<(), ConvertError> {
         let fields = mt.info().fields.len();
         for (share, coded) in coded.0.into_iter().enumerate() {
@@ -386,8 +394,8 @@ impl Batch {
                     errors: self.errors_of(i, fields),
                 };
                 mt.push(&record).map_err(damaged)?;
-                let page = (u.0 >> mt.pages.bits()) as usize;
-                facts.widen(page, coded.bounds[at], &coded.ranges[at * fields..][..fields]);
+                let parents = &coded.parents[before(at, |at| coded.parent_ends[at])..coded.parent_ends[at]];
+                reaches.push(coded.bounds[at], &coded.ranges[at * fields..][..fields], parents);
             }
             coded.faults.into_iter().for_each(|fault| facts.note(fault));
             coded.failed.map_or(Ok(()), Err)?;

@@ -11,6 +11,7 @@ use super::removers::Remover;
 use super::scratch::Scratch;
 use super::store::{BaseMark, ForestChild, HalfEdgeMt};
 use crate::mt::facts::{MtFacts, level_volumes};
+use crate::mt::reaches::Reaches;
 use crate::mt::{
     ApplyUpdates, BaseMesh, ConvertError, CurrentMesh, ErrorCode, Margins, MtInfo, MultiTessellation,
 };
@@ -38,6 +39,7 @@ pub struct HalfEdgeBuilder {
     names: Vec<u32>,
     margins: Margins,
     facts: MtFacts,
+    reaches: Reaches,
     /// The mesh with all updates but those of the last batch.
     mesh: CurrentMesh,
     scratch: Box<Scratch>,
@@ -71,6 +73,7 @@ impl HalfEdgeBuilder {
             forest,
             names,
             facts: MtFacts::default(),
+            reaches: Reaches::default(),
             mesh,
             scratch: Box::default(),
             len: 0,
@@ -101,16 +104,16 @@ impl HalfEdgeBuilder {
 
     /// Applies the updates that have come, codes the stars of those before, and begins a new batch.
     fn turn(&mut self) -> Result<(), ConvertError> {
-        let Self { mt, forest, names, margins, facts, mesh, scratch, next, applied, .. } = self;
+        let Self { mt, forest, names, margins, facts, reaches, mesh, scratch, next, applied, .. } = self;
         let (grown, whole, tree) = (&mut *next, &*mt, &*forest);
         let (done, coded) = threads::join(
             || grown.apply(whole, tree, names, mesh, scratch),
             || applied.code(whole, tree, margins),
         );
-        applied.append(coded, mt, forest, facts)?;
+        applied.append(coded, mt, forest, (facts, reaches))?;
         if done.is_err() {
             // What comes before the fault may have one itself.
-            next.append(next.code(mt, forest, margins), mt, forest, facts)?;
+            next.append(next.code(mt, forest, margins), mt, forest, (facts, reaches))?;
         }
         std::mem::swap(next, applied);
         next.clear(self.len);
@@ -124,8 +127,9 @@ impl HalfEdgeBuilder {
     pub fn finish(mut self) -> Result<HalfEdgeMt, ConvertError> {
         self.turn()?;
         self.turn()?;
-        let Self { mut mt, mut facts, mesh, .. } = self;
+        let Self { mut mt, mut facts, reaches, mesh, .. } = self;
         if mt.updates() == mt.info().updates {
+            facts.reaches = reaches.of_pages(mt.pages.bits(), mt.info().fields.len());
             facts.volumes = level_volumes(mt.info(), &mesh);
             mt.set_facts(facts);
         }

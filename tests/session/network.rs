@@ -1,0 +1,170 @@
+//! Promise: what a request needs of a file elsewhere is asked for at once. One look at the index gives every block that it can need, and
+//! no byte comes twice.
+
+use crate::support::meshes::{bent, blocks, hilly, linear};
+use crate::support::network::{Network, Visitor};
+use crate::support::random::Random;
+use std::sync::{Arc, LazyLock};
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::geom::{Bounds, Camera};
+use tetralod::mesh::TetMesh;
+use tetralod::refine::{Custom, Need, Region, Request, Transfer, View};
+use tetralod::session::Session;
+use tetralod::stream::LoaderOptions;
+use tetralod_build::{BuildConfig, build};
+use tetralod_io::generate;
+
+const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0 };
+
+/// A half-edge file in many blocks.
+fn file(mesh: &TetMesh) -> Vec<u8> {
+    let config = BuildConfig { block_bits: 4, all_fields: true, ..BuildConfig::default() };
+    let mt = build(mesh, &config).expect("a valid mesh").mt;
+    encode(&mt, &EncodeOptions::default()).expect("a sound MT")
+}
+
+/// Files that are several times as large as what a session asks for at first, with names.
+static FILES: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
+    let mut ell = blocks([32, 26, 18], &[hilly, linear], |c| c[0] < 18 || c[1] < 11);
+    let mut random = Random::new(3);
+    for field in &mut ell.fields {
+        field.values.iter_mut().for_each(|x| *x += 0.1 * random.fraction());
+    }
+    let bucky = generate::bucky(27).expect("a size that is allowed");
+    let files = [("bucky", bucky), ("bent", bent(25)), ("ell", ell)].map(|(name, mesh)| (name, file(&mesh)));
+    for (name, file) in &files {
+        assert!(file.len() > 130_000, "{name}: {}", file.len());
+    }
+    files.into()
+});
+
+/// From beside the model into a corner of it.
+fn view(bounds: &Bounds) -> View {
+    let mut camera = Camera::home(bounds, 1.5);
+    camera.zoom(0.2);
+    camera.pan(0.3, 0.2);
+    View { matrix: camera.view_projection(1.5).to_cols_array(), viewport: [1200.0, 800.0] }
+}
+
+/// Requests of every kind, with names.
+fn requests(session: &Session) -> Vec<(&'static str, Request)> {
+    let bounds = session.bounds().expect("a file that is open");
+    let fields = &session.info().expect("a file that is open").fields;
+    let at = |part: f64| [0, 1, 2].map(|i| bounds.min[i] + part * (bounds.max[i] - bounds.min[i]));
+    let inside = Bounds { min: at(0.3), max: at(0.55) };
+    let corner = Bounds { min: at(0.0), max: at(0.1) };
+    let last = fields.len() - 1;
+    let value = |part: f64| fields[last].min + part * fields[last].range();
+    let points = vec![(value(0.6), [0.0; 4]), (value(0.8), [1.0, 0.5, 0.0, 0.7])];
+    let colours = Transfer { field: last, points, unit_length: 1.0 };
+    let ball = Region::Sphere { centre: at(0.7), radius: 0.1 * bounds.diagonal() };
+    let slab = Region::Slab { normal: [1.0, 1.0, 0.0], offset: at(0.5)[0] + at(0.5)[1], thickness: 0.0 };
+    vec![
+        ("all", Request::within(0.0)),
+        ("5 %", Request::within(0.05)),
+        ("a box", Need::within(0.0).inside(inside).into()),
+        ("a box at 1 %", Need::within(0.01).inside(inside).into()),
+        ("a corner", Need::within(0.0).inside(corner).into()),
+        ("a ball", Need::within(0.002).inside(ball.clone()).into()),
+        ("a section", Need::within(0.005).inside(slab).into()),
+        ("an isosurface", Need::within(0.0).around(last, &[value(0.5)]).into()),
+        ("an isosurface in a box", Need::within(0.0).around(last, &[value(0.3)]).inside(inside).into()),
+        ("a view", Need::seen(view(&bounds), 1.0).into()),
+        ("colours", Need::shown(colours, 0.01).into()),
+        (
+            "several",
+            Request::within(0.1).and(Need::within(0.0).inside(ball)).and(Need::seen(view(&bounds), 4.0)),
+        ),
+    ]
+}
+
+#[test]
+fn one_look_at_the_index_gives_all_that_a_request_needs() {
+    for (what, file) in FILES.iter() {
+        let mut whole = Session::new();
+        whole.feed(file).expect("a sound file");
+        let opened = Visitor::new(file, NETWORK, LoaderOptions::default()).open();
+        assert!(opened.rounds <= 2, "{what}: {opened:?}");
+        for (name, request) in requests(&whole) {
+            whole.refine(&request).expect("a sensible request");
+            for gap in [0, 1000] {
+                let options = LoaderOptions { gap, ..LoaderOptions::default() };
+                let mut visitor = Visitor::new(file, NETWORK, options);
+                visitor.open();
+                let cost = visitor.refine(&request).expect("a sensible request");
+                let case = format!("{what}, {name}, gap {gap}: {cost:?}");
+                assert_eq!(visitor.session.hash(), whole.hash(), "{case}");
+                assert_eq!(visitor.session.block_progress().missed, 0, "{case}");
+                println!(
+                    "{case}, {} of {}",
+                    visitor.session.block_progress().here,
+                    visitor.session.block_progress().blocks
+                );
+                assert!(cost.rounds <= 1 && cost.repeated == 0, "{case}");
+            }
+        }
+    }
+}
+
+/// The same for one request after the other, each of which leaves blocks behind.
+#[test]
+fn no_byte_comes_twice() {
+    for (what, file) in FILES.iter() {
+        let mut whole = Session::new();
+        whole.feed(file).expect("a sound file");
+        let mut visitor = Visitor::new(file, NETWORK, LoaderOptions { gap: 700, ..LoaderOptions::default() });
+        let mut bytes = visitor.open().bytes;
+        for (name, request) in requests(&whole).into_iter().rev() {
+            whole.refine(&request).expect("a sensible request");
+            let cost = visitor.refine(&request).expect("a sensible request");
+            bytes += cost.bytes;
+            assert_eq!(visitor.session.hash(), whole.hash(), "{what}, {name}");
+            assert!(cost.rounds <= 1 && cost.repeated == 0, "{what}, {name}: {cost:?}");
+            assert_eq!(visitor.session.block_progress().missed, 0, "{what}, {name}");
+        }
+        assert!(bytes <= file.len() as u64, "{what}: {bytes} of {}", file.len());
+    }
+}
+
+/// A budget is for what has the largest errors: little is fetched beyond what it has room for.
+#[test]
+fn budgets_fetch_what_they_have_room_for() {
+    let (_, file) = &FILES[0];
+    let mut whole = Session::new();
+    whole.feed(file).expect("a sound file");
+    for budget in [5000, 15_000, 40_000] {
+        for request in [Request::within(0.0), Need::within(0.0).around(0, &[128.0]).into()] {
+            let request: Request = request.at_most(budget);
+            whole.refine(&request).expect("a sensible request");
+            let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
+            visitor.open();
+            visitor.refine(&request).expect("a sensible request");
+            assert_eq!(visitor.session.hash(), whole.hash(), "{request:?}");
+            let progress = visitor.session.block_progress();
+            let most = progress.blocks * budget / 60_000 + 400;
+            println!("{budget}: {progress:?}");
+            assert!(progress.here <= most, "{budget}: {progress:?}");
+        }
+    }
+}
+
+/// What only a caller's function can tell is found step by step.
+#[test]
+fn requests_of_the_callers_own_have_their_mesh_too() {
+    let (_, file) = &FILES[0];
+    let left = || {
+        Arc::new(Custom::new(|tet| {
+            let is_left = tet.corners.iter().any(|corner| corner[0] < 1000);
+            if is_left { tet.error.error() / 0.001 } else { 0.0 }
+        }))
+    };
+    let request = Request::within(0.3);
+    let mut whole = Session::new();
+    whole.feed(file).expect("a sound file");
+    whole.request_with(&request, &[left()]).expect("a sensible request");
+    whole.step(&mut |_| true).expect("a sound file");
+    let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
+    visitor.open();
+    visitor.refine_with(&request, &[left()]).expect("a sensible request");
+    assert_eq!(visitor.session.hash(), whole.hash());
+}
