@@ -132,7 +132,7 @@ export interface ReadOptions {
   backoffMs?: number;
   /** A request fails after so many milliseconds without a byte. Default: 30000. */
   timeoutMs?: number;
-  /** Ranges closer to each other than so many bytes are fetched as one. Default: 16384. */
+  /** Ranges closer to each other than so many bytes are fetched as one. Default: what suits the network, as measured. */
   gap?: number;
 }
 

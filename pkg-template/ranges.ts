@@ -87,6 +87,10 @@ interface Action {
   until?: number;
 }
 
+/** Protocols that carry many answers over one connection, and how many are asked for at a time then. */
+const STREAMING = ["h2", "h3"];
+const STREAMS = 24;
+
 /** Tells the loader of a request, unless it has cancelled that; whether it wants more of it. */
 type Tell = (what: (now: number) => void) => boolean;
 
@@ -111,6 +115,7 @@ export class Ranges {
   #failed = false;
   #closed = false;
   #knowsServer = false;
+  #knowsProtocol = false;
   #forgets = false;
 
   constructor(Loader: Loader, url: string, sink: RangesSink, options: RangesOptions = {}) {
@@ -291,6 +296,16 @@ export class Ranges {
     }
     if (this.#open.get(id) === controller) this.#open.delete(id);
     controller.abort();
+    this.#learnProtocol(asked);
+  }
+
+  /** Browsers open few connections to a server, but ask for many things at once on one where the protocol can. */
+  #learnProtocol(url: string) {
+    if (this.#closed || this.#knowsProtocol || this.#options.maxRequests !== undefined) return;
+    const entries = globalThis.performance?.getEntriesByName?.(url, "resource") ?? [];
+    const { nextHopProtocol = "" } = (entries.at(-1) as PerformanceResourceTiming | undefined) ?? {};
+    this.#knowsProtocol = nextHopProtocol !== "";
+    if (STREAMING.includes(nextHopProtocol)) this.#loader.setMaxRequests(STREAMS);
   }
 
   async #receive(id: number, url: string, [start, end]: [number, number], signal: AbortSignal, tell: Tell) {

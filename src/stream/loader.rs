@@ -13,8 +13,9 @@ use std::ops::Range;
 pub struct LoaderOptions {
     /// Most requests at a time.
     pub max_requests: usize,
-    /// Unwanted bytes that are rather fetched than asked around; they are kept, for they may be wanted later.
-    pub gap: u64,
+    /// Unwanted bytes that are rather fetched than asked around; they are kept, for they may be wanted later. None follows the network: the
+    /// slower an answer begins, and the faster it comes then, the more.
+    pub gap: Option<u64>,
     /// Most unwanted bytes that are kept.
     pub spare_bytes: u64,
     /// Most bytes in one request.
@@ -32,12 +33,12 @@ pub struct LoaderOptions {
 }
 
 impl Default for LoaderOptions {
-    /// Six requests of up to 4 MiB over gaps of up to 16 KiB, of which 32 MiB are kept; five more tries, after 0.5 s to 10 s; 30 s of
-    /// silence.
+    /// Six requests of up to 4 MiB over gaps that suit the network, of which 32 MiB are kept; five more tries, after 0.5 s to 10 s; 30 s
+    /// of silence.
     fn default() -> Self {
         Self {
             max_requests: 6,
-            gap: 16 << 10,
+            gap: None,
             spare_bytes: 32 << 20,
             max_request_bytes: 4 << 20,
             retries: 5,
@@ -139,6 +140,7 @@ pub struct Loader {
     pauses: Vec<Pause>,
     cancelled: Vec<u32>,
     file: Version,
+    pace: Pace,
     /// Whether the server has answered with a range, or with the whole file instead.
     ranges: Option<bool>,
     error: Option<StreamError>,
@@ -156,6 +158,9 @@ struct Request {
     /// The next byte of the body, and its end.
     body: Range<u64>,
     answered: bool,
+    /// When it was made, and when its head came, in milliseconds.
+    made: u64,
+    headed: u64,
     /// Bytes of it that were wanted.
     used: u64,
     /// Tries before it that brought nothing.
@@ -214,10 +219,83 @@ fn agree<T: PartialEq>(known: &mut Option<T>, found: Option<T>) -> Result<(), St
     }
 }
 
+/// How soon answers begin, and how fast they come then, as far as is known.
+#[derive(Debug, Default)]
+struct Pace {
+    latency_ms: Option<f64>,
+    /// Of one request.
+    bytes_per_ms: Option<f64>,
+}
+
+/// Gaps before anything is known of the network.
+const USUAL_GAP: u64 = 16 << 10;
+/// Smaller gaps cost less than the head of a request.
+const LEAST_GAP: f64 = 1024.0;
+/// A byte that nobody has asked for is worth so much of the time that it takes: others pay for it, too.
+const WASTE: f64 = 8.0;
+/// Rates of fewer bytes say more of the clock than of the network.
+const RATED_BYTES: u64 = 32 << 10;
+
+impl Pace {
+    /// Takes in how long the head of an answer took.
+    fn note_latency(&mut self, ms: u64) {
+        blend(&mut self.latency_ms, ms as f64);
+    }
+
+    /// Takes in how long a body took.
+    fn note_rate(&mut self, bytes: u64, ms: u64) {
+        if bytes >= RATED_BYTES {
+            blend(&mut self.bytes_per_ms, bytes as f64 / ms.max(1) as f64);
+        }
+    }
+
+    /// How to fetch `free`, the rest of so many bytes that are needed.
+    ///
+    /// Asking around a gap takes an answer more, of which only the wait counts: the gap whose bytes take as long saves nothing. Much
+    /// smaller ones are bridged, unless there are so many that all waits together take longer than all gaps. And requests take equal shares of
+    /// what is needed, unless waits would be longer than what they bring.
+    fn plan(&self, options: &LoaderOptions, free: &RangeSet, needed: u64) -> Plan {
+        let most = options.max_request_bytes.max(1);
+        if let Some(gap) = options.gap {
+            return Plan { gap, most, before: 0 };
+        }
+        let (Some(latency), Some(rate)) = (self.latency_ms, self.bytes_per_ms) else {
+            return Plan { gap: USUAL_GAP, most, before: 0 };
+        };
+        let even = latency * rate;
+        let lanes = options.max_requests.max(1) as f64;
+        let runs = free.iter().count() as f64;
+        let around = (runs / lanes).ceil() * latency + free.len() as f64 / (rate * lanes);
+        let all = free.hull().map_or(0.0, |hull| latency + (hull.end - hull.start) as f64 / rate);
+        let gap = if around > all { even } else { even / WASTE }.max(LEAST_GAP) as u64;
+        let share = (needed as f64 / lanes).max(even) as u64;
+        Plan { gap, most: share.clamp(1, most), before: even as u64 }
+    }
+}
+
+/// How much goes into a request.
+struct Plan {
+    /// The largest gap that is fetched with what is around it.
+    gap: u64,
+    /// Bytes at most, as far as they are not one run, and of these at most so many in front of the most important ones.
+    most: u64,
+    before: u64,
+}
+
+/// Moves a mean towards what was measured last.
+fn blend(mean: &mut Option<f64>, measured: f64) {
+    *mean = Some(mean.map_or(measured, |mean| 0.7 * mean + 0.3 * measured));
+}
+
 impl Loader {
     /// A loader of one file.
     pub fn new(options: LoaderOptions) -> Self {
         Self { options, drawn: options.seed, ..Self::default() }
+    }
+
+    /// Makes more or fewer requests at a time from now on.
+    pub fn set_max_requests(&mut self, most: usize) {
+        self.options.max_requests = most;
     }
 
     /// Says which ranges are wanted from now on, all of them: what is missing in `wanted` is not wanted any more.
@@ -262,7 +340,8 @@ impl Loader {
         let Some(at) = self.position(id) else { return };
         let request = &mut self.requests[at];
         request.deadline = now_ms.saturating_add(self.options.timeout_ms);
-        request.answered = true;
+        (request.answered, request.headed) = (true, now_ms);
+        self.pace.note_latency(now_ms.saturating_sub(request.made));
         let judged = head.judge(&request.asked);
         let judged = judged.and_then(|answer| self.file.learn(head).map(|()| answer));
         match judged {
@@ -636,6 +715,8 @@ impl Loader {
     /// The body of a request is there; that of a part may be less than was asked for.
     fn finish(&mut self, at: usize, now: u64) {
         let request = self.requests.swap_remove(at);
+        let bytes = request.body.end.saturating_sub(request.asked.start);
+        self.pace.note_rate(bytes, now.saturating_sub(request.headed));
         if request.body.end < request.asked.end.min(self.file.end()) {
             // Allowed, but a server that gives a few bytes each time gets us nowhere.
             self.stumble(request, StreamError::WrongRange("a small part of it".to_owned()), now, 0);
@@ -652,16 +733,26 @@ impl Loader {
 
     /// The range from `start` over what is free, and over gaps that are small, not on their way, and have not come before.
     ///
-    /// It grows forwards alone: what is before the most important bytes would come before them.
+    /// It grows backwards only by what comes within a wait: that comes before the most important bytes.
     fn grown(&self, start: u64, free: &RangeSet) -> Range<u64> {
-        let limit = start.saturating_add(self.options.max_request_bytes.max(1));
+        let Plan { gap, most, before } = self.pace.plan(&self.options, free, self.needed.len());
+        let is_bridged = |gap_between: Range<u64>| {
+            gap_between.end - gap_between.start <= gap && !self.is_busy(&gap_between)
+        };
+        let limit = start.saturating_add(most);
         let mut grown = start..start;
         while let Some(next) = free.first_in(&(grown.end..limit)) {
-            let gap = grown.end..next.start;
-            if gap.end - gap.start > self.options.gap || self.is_busy(&gap) {
+            if !is_bridged(grown.end..next.start) {
                 break;
             }
             grown.end = next.end;
+        }
+        let first = start.saturating_sub(before.min(most.saturating_sub(grown.end - grown.start)));
+        while let Some(last) = free.last_in(&(first..grown.start)) {
+            if !is_bridged(last.end..grown.start) {
+                break;
+            }
+            grown.start = last.start;
         }
         grown
     }
@@ -676,7 +767,18 @@ impl Loader {
         let id = self.last_id;
         let deadline = now.saturating_add(self.options.timeout_ms);
         let (asked, body) = (range.clone(), range.clone());
-        self.requests.push(Request { id, asked, body, answered: false, used: 0, strikes, deadline });
+        let (made, headed) = (now, now);
+        self.requests.push(Request {
+            id,
+            asked,
+            body,
+            answered: false,
+            made,
+            headed,
+            used: 0,
+            strikes,
+            deadline,
+        });
         self.traffic.requests += 1;
         Action::Fetch { id, range, if_match: self.file.etag.clone() }
     }

@@ -64,6 +64,14 @@ impl RangeSet {
         (part.start < part.end).then_some(part)
     }
 
+    /// The last run of bytes that are in the set and in `range`.
+    pub fn last_in(&self, range: &Range<u64>) -> Option<Range<u64>> {
+        let found =
+            self.ranges.get(self.ranges.partition_point(|found| found.start < range.end).checked_sub(1)?)?;
+        let part = found.start.max(range.start)..found.end.min(range.end);
+        (part.start < part.end).then_some(part)
+    }
+
     /// From the first to behind the last byte.
     pub fn hull(&self) -> Option<Range<u64>> {
         Some(self.ranges.first()?.start..self.ranges.last()?.end)

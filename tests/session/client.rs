@@ -233,7 +233,7 @@ fn serve(session: &mut Session, loader: &mut Loader, file: &[u8]) -> Result<(), 
 #[test]
 fn without_io_it_is_the_same_machine() {
     let file = file(MtKind::HalfEdge);
-    let mut loader = Loader::new(LoaderOptions { gap: 64, ..LoaderOptions::default() });
+    let mut loader = Loader::new(LoaderOptions { gap: Some(64), ..LoaderOptions::default() });
     let mut session = Session::in_parts(DecodeOptions::default(), u64::MAX);
     serve(&mut session, &mut loader, &file).expect("a sound file");
     assert!(session.mesh().is_some() && !session.is_waiting());

@@ -87,20 +87,39 @@ fn one_look_at_the_index_gives_all_that_a_request_needs() {
         assert!(opened.rounds <= 2, "{what}: {opened:?}");
         for (name, request) in requests(&whole) {
             whole.refine(&request).expect("a sensible request");
-            for gap in [0, 1000] {
+            for gap in [Some(0), Some(1000), None] {
                 let options = LoaderOptions { gap, ..LoaderOptions::default() };
                 let mut visitor = Visitor::new(file, NETWORK, options);
                 visitor.open();
                 let cost = visitor.refine(&request).expect("a sensible request");
-                let case = format!("{what}, {name}, gap {gap}: {cost:?}");
+                let case = format!("{what}, {name}, gap {gap:?}: {cost:?}");
                 assert_eq!(visitor.session.hash(), whole.hash(), "{case}");
                 assert_eq!(visitor.session.block_progress().missed, 0, "{case}");
-                println!(
-                    "{case}, {} of {}",
-                    visitor.session.block_progress().here,
-                    visitor.session.block_progress().blocks
-                );
                 assert!(cost.rounds <= 1 && cost.repeated == 0, "{case}");
+            }
+        }
+    }
+}
+
+/// Waiting for what a request needs is no slower than reading all the rest of the file, however many parts that is and whatever the
+/// network is like.
+#[test]
+fn no_request_takes_longer_than_the_rest_of_the_file() {
+    let networks = [(5.0, 500.0), (40.0, 2500.0), (300.0, 1000.0), (300.0, 20_000.0)];
+    for (what, file) in FILES.iter() {
+        let mut whole = Session::new();
+        whole.feed(file).expect("a sound file");
+        for (latency_ms, bytes_per_ms) in networks {
+            let network = Network { latency_ms, bytes_per_ms };
+            for (name, request) in requests(&whole) {
+                let mut visitor = Visitor::new(file, network, LoaderOptions::default());
+                let rest = file.len() as u64 - visitor.open().bytes;
+                let cost = visitor.refine(&request).expect("a sensible request");
+                let streamed = (latency_ms + rest as f64 / bytes_per_ms) / 1000.0;
+                assert!(
+                    cost.seconds <= 1.05 * streamed,
+                    "{what}, {name}, {network:?}: {cost:?} for {streamed}"
+                );
             }
         }
     }
@@ -112,7 +131,8 @@ fn no_byte_comes_twice() {
     for (what, file) in FILES.iter() {
         let mut whole = Session::new();
         whole.feed(file).expect("a sound file");
-        let mut visitor = Visitor::new(file, NETWORK, LoaderOptions { gap: 700, ..LoaderOptions::default() });
+        let mut visitor =
+            Visitor::new(file, NETWORK, LoaderOptions { gap: Some(700), ..LoaderOptions::default() });
         let mut bytes = visitor.open().bytes;
         for (name, request) in requests(&whole).into_iter().rev() {
             whole.refine(&request).expect("a sensible request");
@@ -142,7 +162,6 @@ fn budgets_fetch_what_they_have_room_for() {
             assert_eq!(visitor.session.hash(), whole.hash(), "{request:?}");
             let progress = visitor.session.block_progress();
             let most = progress.blocks * budget / 60_000 + 400;
-            println!("{budget}: {progress:?}");
             assert!(progress.here <= most, "{budget}: {progress:?}");
         }
     }

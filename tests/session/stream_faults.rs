@@ -154,7 +154,7 @@ fn options() -> HttpOptions {
         backoff_ms: 10,
         timeout_ms: 400,
         max_request_bytes: 30_000,
-        gap: 500,
+        gap: Some(500),
         ..LoaderOptions::default()
     };
     HttpOptions { loader, ..HttpOptions::default() }

@@ -24,7 +24,7 @@ fn wanted(range: Range<u64>, priority: f32) -> WantedRange {
 fn small() -> LoaderOptions {
     LoaderOptions {
         max_requests: 3,
-        gap: 20,
+        gap: Some(20),
         spare_bytes: 0,
         max_request_bytes: 300,
         ..LoaderOptions::default()
@@ -315,7 +315,7 @@ proptest! {
         max_request_bytes in 1u64..900,
         chosen in prop::collection::vec(0..FAULTS.len(), 1..5),
     ) {
-        let limits = LoaderOptions { max_requests, gap, max_request_bytes, seed, ..LoaderOptions::default() };
+        let limits = LoaderOptions { max_requests, gap: Some(gap), max_request_bytes, seed, ..LoaderOptions::default() };
         let options = LoaderOptions { spare_bytes: 0, ..limits };
         let mut world = World::new(seed, options);
         let faults: Vec<Fault> = chosen.into_iter().map(|at| FAULTS[at]).collect();
@@ -488,7 +488,7 @@ fn tries_get_rarer_and_end() {
 
 #[test]
 fn what_a_cache_has_is_read_from_there_and_not_fetched() {
-    let mut loader = Loader::new(LoaderOptions { gap: 0, ..LoaderOptions::default() });
+    let mut loader = Loader::new(LoaderOptions { gap: Some(0), ..LoaderOptions::default() });
     loader.want(&[wanted(0..10, 0.0)]);
     assert_eq!(fetches(&mut loader, 0), [(1, 0..10)]);
     loader.head(
@@ -651,7 +651,7 @@ fn events_of_requests_that_are_over_change_nothing() {
 #[test]
 fn many_small_ranges_take_few_requests_in_any_order_of_importance() {
     let (count, size) = (10_000u64, 64u64);
-    let options = LoaderOptions { gap: 0, max_request_bytes: 1 << 14, ..LoaderOptions::default() };
+    let options = LoaderOptions { gap: Some(0), max_request_bytes: 1 << 14, ..LoaderOptions::default() };
     for shuffled in [false, true] {
         let mut loader = Loader::new(options);
         let mut random = Random::new(7);

@@ -53,7 +53,7 @@ impl RangeLoader {
         let number = |given: Option<f64>, default: u64| given.map_or(default, |given| given as u64);
         let loader = Loader::new(LoaderOptions {
             max_requests: max_requests.map_or(default.max_requests, |most| most as usize),
-            gap: number(gap, default.gap),
+            gap: gap.map(|gap| gap as u64),
             max_request_bytes: number(max_request_bytes, default.max_request_bytes),
             retries: retries.unwrap_or(default.retries),
             backoff_ms: number(backoff_ms, default.backoff_ms),
@@ -62,6 +62,12 @@ impl RangeLoader {
             ..default
         });
         Self { loader: Rc::new(RefCell::new(loader)) }
+    }
+
+    /// Asks for more or less at a time from now on.
+    #[wasm_bindgen(js_name = setMaxRequests)]
+    pub fn set_max_requests(&self, most: u32) {
+        self.loader.borrow_mut().set_max_requests(most as usize);
     }
 
     /// Says what is wanted from now on, all of it: start, end and priority of each range. Files do so by themselves.
