@@ -4,6 +4,7 @@
  */
 
 import { type TetralodError, known, ofFile, reviveError } from "./errors.js";
+import type { Traffic } from "./results.js";
 import type { RangeLoader } from "./tetralod_core.js";
 
 /** The headers that the loader reads, in its order. */
@@ -163,10 +164,9 @@ export class Ranges {
     return this.#closed ? undefined : this.#loader.servesRanges();
   }
 
-  /** Statistics: requests, bytes that have arrived, and bytes that were needed. */
-  get traffic() {
-    const [requests, received, used] = this.#closed ? [0, 0, 0] : this.#loader.traffic();
-    return { requests, received, used };
+  get traffic(): Traffic {
+    const [requests, received, used, repeated, rounds, waitedMs] = this.#closed ? new Float64Array(6) : this.#loader.traffic();
+    return { requests, received, used, repeated, rounds, waitedMs };
   }
 
   /** Ends all requests. */

@@ -72,6 +72,22 @@ export interface ErrorCurve {
   bytes: Float64Array;
 }
 
+/** What has been asked of a server, and has come. */
+export interface Traffic {
+  /** Requests so far. */
+  requests: number;
+  /** Bytes that have come. */
+  received: number;
+  /** Those of them that were needed when they came. */
+  used: number;
+  /** Those that had come before. */
+  repeated: number;
+  /** How often something was asked for while nothing was on its way. */
+  rounds: number;
+  /** Milliseconds for which something was. */
+  waitedMs: number;
+}
+
 /** How the blocks of a file stand of which only those come that are needed. */
 export interface BlockProgress {
   /** Blocks of the file. */

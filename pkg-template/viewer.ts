@@ -19,7 +19,7 @@ import { TetralodError, badOption, known, ofFile, reviveError } from "./errors.j
 import { changedScene } from "./fit.js";
 import { type Deferred, Latest, type Update, deferred, mergeUpdates } from "./latest.js";
 import { type Need, type ReadOptions, type Reading as Fetching, type RefineOptions, type Unchecked, type ViewOptions, checkAmount, checkNames, openOptions, sendable } from "./options.js";
-import type { BlockMap, BlockProgress, Mesh, MtInfo, RefineStats } from "./results.js";
+import type { BlockMap, BlockProgress, Mesh, MtInfo, RefineStats, Traffic } from "./results.js";
 import type { Remote } from "./rpc.js";
 import type { CameraState, Legend, Misfit, Overlay, Reading, SceneState, ViewerChanges, ViewerState } from "./scene.js";
 import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
@@ -29,7 +29,7 @@ import { type AwaitOptions, type FieldOptions, setCaller, withMeshTools } from "
 import type { ViewerMethods } from "./viewer-worker.js";
 
 export { TetralodError, absolute };
-export type { BlockMap } from "./results.js";
+export type { BlockMap, Traffic } from "./results.js";
 export type {
   ArrowState,
   AxisOverlay,
@@ -66,8 +66,8 @@ export interface ViewerProgress {
   total: number | undefined;
   /** Of a file that is fetched in parts: the state of its blocks. */
   blocks?: BlockProgress;
-  /** Of such a file: requests so far, bytes that have arrived with them, and how many of these were needed. */
-  traffic?: { requests: number; received: number; used: number };
+  /** Of such a file: what has been asked of the server. */
+  traffic?: Traffic;
 }
 
 /**

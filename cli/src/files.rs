@@ -11,7 +11,7 @@ use tetralod::format::DecodeOptions;
 use tetralod::mesh::RepairLevel;
 use tetralod::mt::{Mt, MtInfo};
 use tetralod::session::{Client, Session};
-use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, WantedRange};
+use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, Traffic, WantedRange};
 use tetralod::stream::{HttpOptions, HttpSource};
 use tetralod_build::verify::Reference;
 use tetralod_build::{Construction, Method};
@@ -246,15 +246,19 @@ pub struct Opened {
     pub session: Session,
     /// Of the file.
     pub bytes: u64,
-    /// Bytes that were read, each counted once.
+    /// Bytes that were read: from a disk each counted once, over a network as they came.
     pub read: u64,
+    /// What that took of a network, if the file is there.
+    pub traffic: Option<Traffic>,
 }
 
 impl Opened {
     /// What a client has.
     pub fn of(client: Client<Bytes>) -> Self {
-        let read = client.session().arrived();
-        Self { bytes: client.total().unwrap_or(read), read, session: client.into_session() }
+        let traffic = client.traffic();
+        let read = traffic.map_or(client.session().arrived(), |traffic| traffic.received);
+        let bytes = client.total().unwrap_or(read);
+        Self { bytes, read, traffic, session: client.into_session() }
     }
 
     pub fn mt(&self) -> Result<&Mt> {
@@ -294,6 +298,10 @@ impl RangeSource for Bytes {
 
     fn total(&self) -> Option<u64> {
         self.0.total()
+    }
+
+    fn traffic(&self) -> Option<Traffic> {
+        self.0.traffic()
     }
 }
 
@@ -338,7 +346,7 @@ pub fn open_parts(path: &Path) -> Result<Client<Bytes>> {
 pub fn open_mt(path: &Path) -> Result<Opened> {
     let session = Bytes::of(path).and_then(read_mt).with_context(|| path.display().to_string())?;
     let bytes = session.progress().bytes;
-    Ok(Opened { session, bytes, read: bytes })
+    Ok(Opened { session, bytes, read: bytes, traffic: None })
 }
 
 fn read_mt(mut source: Bytes) -> Result<Session> {

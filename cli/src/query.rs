@@ -15,6 +15,7 @@ use tetralod::format::FormatError;
 use tetralod::mt::{FieldInfo, Mt, MtInfo};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
 use tetralod::session::{Client, ClientError};
+use tetralod::stream::Traffic;
 use tetralod_io::{PointValues, PolyData};
 
 /// What the options look like in use.
@@ -254,9 +255,28 @@ pub struct Summary {
     pub coarsened: u64,
     pub forced: u64,
     pub judged: u64,
-    /// Bytes of the file that were read: where blocks of it are not needed, not all.
+    /// Bytes of the file that were read, those of a server as they came: where blocks of it are not needed, not all.
     pub bytes_read: u64,
     pub file_bytes: u64,
+    /// Of a file on a server.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network: Option<NetworkReport>,
+}
+
+/// What a request took of a network.
+#[derive(Serialize)]
+pub struct NetworkReport {
+    pub requests: u64,
+    /// How often something was asked for while nothing was on its way.
+    pub rounds: u64,
+    pub seconds_waited: f64,
+}
+
+impl NetworkReport {
+    fn of(traffic: &Traffic) -> Self {
+        let Traffic { requests, rounds, waited_ms, .. } = *traffic;
+        Self { requests, rounds, seconds_waited: waited_ms as f64 / 1000.0 }
+    }
 }
 
 /// What was asked for in one need, and what is guaranteed.
@@ -299,6 +319,7 @@ fn summary(opened: &Opened, number: usize, stats: &RefineStats, needs: &[NamedNe
         judged: stats.judged,
         bytes_read: opened.read,
         file_bytes: opened.bytes,
+        network: opened.traffic.as_ref().map(NetworkReport::of),
     })
 }
 
@@ -327,6 +348,12 @@ impl Summary {
         }
         let [read, all] = [self.bytes_read, self.file_bytes].map(output::bytes);
         rows.push(("read", format!("{read} of {all}")));
+        if let Some(NetworkReport { requests, rounds, seconds_waited }) = &self.network {
+            rows.push((
+                "waited",
+                format!("{seconds_waited:.2} s for {requests} requests in {rounds} rounds"),
+            ));
+        }
         if !self.done {
             rows.push(("", "stopped before it was done".to_owned()));
         } else if !self.satisfied {

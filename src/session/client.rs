@@ -6,7 +6,7 @@
 use super::{Session, SessionError};
 use crate::format::{DecodeOptions, FormatError};
 use crate::refine::{GoOn, RefineStats, Request};
-use crate::stream::{RangeSource, StreamError, WantedRange};
+use crate::stream::{RangeSource, StreamError, Traffic, WantedRange};
 use std::ops::Range;
 use std::time::Duration;
 use thiserror::Error;
@@ -166,6 +166,11 @@ impl<S: RangeSource> Client<S> {
     /// The session alone, without anything to bring more bytes.
     pub fn into_session(self) -> Session {
         self.session
+    }
+
+    /// What has been asked and has come over a network, if the file is there.
+    pub fn traffic(&self) -> Option<Traffic> {
+        self.source.traffic()
     }
 
     /// The size of the file, once it is known.

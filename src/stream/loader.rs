@@ -112,6 +112,10 @@ pub struct Traffic {
     pub used: u64,
     /// Bytes that had come before, and came again.
     pub repeated: u64,
+    /// How often something was asked for while nothing was on its way.
+    pub rounds: u64,
+    /// Milliseconds for which something was.
+    pub waited_ms: u64,
 }
 
 /// Decides which bytes of a file to ask for next, and takes what comes.
@@ -145,6 +149,8 @@ pub struct Loader {
     ranges: Option<bool>,
     error: Option<StreamError>,
     traffic: Traffic,
+    /// Since when something is on its way, if it is.
+    waiting_since: Option<u64>,
     /// Of jitter.
     drawn: u64,
     last_id: u32,
@@ -317,6 +323,10 @@ impl Loader {
     pub fn next(&mut self, now_ms: u64) -> Option<Action> {
         self.time_out(now_ms);
         self.drop_useless(now_ms);
+        if self.requests.is_empty() {
+            let since = self.waiting_since.take().unwrap_or(now_ms);
+            self.traffic.waited_ms += now_ms.saturating_sub(since);
+        }
         if let Some(id) = self.cancelled.pop() {
             return Some(Action::Cancel { id });
         }
@@ -768,6 +778,8 @@ impl Loader {
         let deadline = now.saturating_add(self.options.timeout_ms);
         let (asked, body) = (range.clone(), range.clone());
         let (made, headed) = (now, now);
+        self.traffic.rounds += u64::from(self.waiting_since.is_none());
+        self.waiting_since.get_or_insert(now);
         self.requests.push(Request {
             id,
             asked,

@@ -1,7 +1,7 @@
 //! Where bytes come from, for native programs: one interface for files and servers.
 
 use super::error::StreamError;
-use super::loader::WantedRange;
+use super::loader::{Traffic, WantedRange};
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::time::Duration;
@@ -19,6 +19,11 @@ pub trait RangeSource {
 
     /// The size of the whole, once it is known.
     fn total(&self) -> Option<u64>;
+
+    /// What has been asked and has come over a network, if that is where the bytes are.
+    fn traffic(&self) -> Option<Traffic> {
+        None
+    }
 }
 
 /// Ranges of whatever can be read and sought: a file that is open, bytes in memory.

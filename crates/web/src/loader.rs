@@ -5,7 +5,7 @@ use js_sys::{Array, Uint8Array};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
-use tetralod::stream::{Action, Failure, Loader, LoaderOptions, ResponseHead, WantedRange};
+use tetralod::stream::{Action, Failure, Loader, LoaderOptions, ResponseHead, Traffic, WantedRange};
 use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -197,10 +197,11 @@ impl RangeLoader {
         self.loader.borrow().serves_ranges()
     }
 
-    /// Requests made, bytes that came, and those of them that were wanted.
+    /// Requests made, bytes that came, those of them that were wanted and that had come before, rounds, and milliseconds waited.
     pub fn traffic(&self) -> Vec<f64> {
-        let traffic = self.loader.borrow().traffic();
-        [traffic.requests, traffic.received, traffic.used].map(|count| count as f64).to_vec()
+        let Traffic { requests, received, used, repeated, rounds, waited_ms } =
+            self.loader.borrow().traffic();
+        [requests, received, used, repeated, rounds, waited_ms].map(|count| count as f64).to_vec()
     }
 }
 

@@ -140,11 +140,6 @@ impl HttpSource {
         }
     }
 
-    /// What has been asked and has come over the network.
-    pub fn traffic(&self) -> Traffic {
-        self.loader.traffic()
-    }
-
     /// Whether the server gives ranges; where it does not, everything passes by from the start for whatever is wanted.
     pub fn serves_ranges(&self) -> Option<bool> {
         self.loader.serves_ranges()
@@ -285,6 +280,10 @@ impl RangeSource for HttpSource {
 
     fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError> {
         self.wait(patience)
+    }
+
+    fn traffic(&self) -> Option<Traffic> {
+        Some(self.loader.traffic())
     }
 
     fn total(&self) -> Option<u64> {
