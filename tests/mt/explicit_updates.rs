@@ -51,7 +51,7 @@ fn octahedron(push: impl FnOnce(&mut ExplicitMt)) -> ExplicitMt {
     let mut tets: Vec<[u32; 4]> = ring.map(|[a, b]| [0, a, b, 5]).to_vec();
     tets.extend(ring.map(|[a, b]| [0, b, a, 6]));
     let base = tetralod::mt::BaseMesh { values: vec![0; 7], positions, tets };
-    let mut mt = ExplicitMt::new(tetralod::mt::MtInfo { kind: MtKind::Vertex, ..info }, base);
+    let mut mt = ExplicitMt::new(tetralod::mt::MtInfo { kind: MtKind::Edge, ..info }, base);
     push(&mut mt);
     mt
 }
