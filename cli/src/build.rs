@@ -6,7 +6,7 @@ pub mod report;
 pub mod way;
 
 use self::options::BuildOptions;
-use self::report::{Report, repaired_as, report, rows};
+use self::report::{Report, rows};
 use self::way::{Asked, Way, kept_fields, way};
 use super::output::Verbosity;
 use super::progress::with_progress;
@@ -16,9 +16,8 @@ use super::{files, input, parse, parts};
 use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::mesh::TetMesh;
-use tetralod_build::{BuildConfig, BuildResult};
+use tetralod_build::{BuildConfig, BuildCriterion, BuildResult};
 use tetralod_io::PieceCounts;
 
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
@@ -73,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let level = options.repair.level();
     let may_part = arguments.parts.is_some() || arguments.memory.is_some();
     if let Some(built) = build_pieces(arguments, &config, output)? {
-        return finish(arguments, &config, (built, start), repaired_as(String::new()));
+        return finish(arguments, &config, (built, start), Report::default());
     }
     let (mut mesh, mut repaired) = options.read(&config, level, arguments.memory, may_part)?;
     // Inputs may name others.
@@ -90,20 +89,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let result = match way {
         Way::Whole => build(arguments, &config, mesh)?,
         Way::Parts(count) => {
-            let whole = parts::Whole::Mesh(Box::new(mesh));
-            let side_by_side = rayon::current_num_threads().min(count as usize);
-            let metadata = options.metadata(&config);
-            let parting = parts::Parting { whole, config: &config, count, metadata, side_by_side };
-            parting.build(output, verbosity).with_context(|| options.name())??
+            let (whole, metadata) = (parts::Whole::Mesh(Box::new(mesh)), options.metadata(&config));
+            let built = parts::build(whole, &config, (count, metadata), output, verbosity);
+            built.with_context(|| options.name())??
         }
     };
     angles.iter_mut().for_each(|angles| angles.add_base(&result.mt));
-    finish(
-        arguments,
-        &config,
-        (result, start),
-        Report { repair, angles, notes, ..repaired_as(repaired.to_string()) },
-    )
+    let known = Report { repaired: repaired.to_string(), repair, angles, notes, ..Report::default() };
+    finish(arguments, &config, (result, start), known)
 }
 
 /// Writes the MT, and says what there is; `known` has what is known of the repair and the angles.
@@ -116,12 +109,18 @@ fn finish(
     let Arguments { options, verbosity, output, .. } = arguments;
     let Some(output) = output else { return Err(anyhow!("-o FILE is missing")) };
     let BuildResult { mt, summary, exact, .. } = result;
-    let metadata = options.metadata(config);
-    let options = EncodeOptions { check_margins: true, exact, histograms: true, metadata };
-    let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
-    let seconds = start.elapsed().as_secs_f64();
-    let Report { repaired, repair, angles, notes, .. } = known;
-    let report = Report { repair, angles, notes, ..report(config, &summary, file_bytes, seconds, repaired) };
+    let file_bytes = files::write_mt(output, &mt, exact, options.metadata(config))?;
+    let report = Report {
+        kind: config.construction.kind().name(),
+        method: config.construction.method().name(),
+        criterion: config.construction.criterion().map(BuildCriterion::name),
+        counts: summary,
+        interface_deviation: (config.preserve_within > 0.0).then_some(summary.interface_deviation),
+        file_bytes,
+        bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
+        seconds: start.elapsed().as_secs_f64(),
+        ..known
+    };
     verbosity.print(&report, &rows(output, &report))
 }
 
@@ -143,11 +142,9 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
             }
         };
         let Way::Parts(count) = way else { return Ok(None) };
-        let side_by_side = rayon::current_num_threads().min(count as usize);
-        let metadata = options.metadata(config);
-        let whole = parts::Whole::Pieces(input);
-        let parting = parts::Parting { whole, config, count, metadata, side_by_side };
-        match parting.build(output, verbosity).with_context(|| options.name())? {
+        let (whole, metadata) = (parts::Whole::Pieces(input), options.metadata(config));
+        let built = parts::build(whole, config, (count, metadata), output, verbosity);
+        match built.with_context(|| options.name())? {
             Ok(built) => Ok(Some(built)),
             Err(why) => {
                 options.tell(&why, verbosity);

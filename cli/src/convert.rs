@@ -7,7 +7,6 @@ use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
-use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::mt::{ConvertError, MtKind, MultiTessellation, UpdatePages};
 
 /// Writes the same updates as an MT of another kind that can hold them (half-edge and vertex, which are both made of vertex
@@ -63,8 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // Conversions keep the numbers of the vertices.
     let exact = opened.session.exact_tables()?;
     let metadata = opened.session.metadata().iter().cloned().collect();
-    let options = EncodeOptions { check_margins: true, exact, histograms: true, metadata };
-    let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
+    let file_bytes = files::write_mt(&arguments.output, &mt, exact, metadata)?;
     let info = mt.info();
     let report = Report {
         kind: info.kind.name(),

@@ -129,7 +129,7 @@ fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
         let reference = Reference { positions: &positions, values: &values, field: answer.field };
         let bound = answer.stats.bounds.get(i);
         let promise = bound.map(|bound| Promise::of(info, answer.field, *bound));
-        let part = Part { ranges, promise, ..Part::default() };
+        let part = Part { ranges, promise };
         let found = deviation(info, mesh, &reference, &part).field;
         let bound = bound.map(|bound| info.field_bound(answer.field, *bound)).filter(|_| answer.stats.done);
         let beyond = bound.filter(|bound| found > bound * (1.0 + ROUNDING));

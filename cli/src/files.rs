@@ -1,15 +1,15 @@
 //! Files in and out: MT files are read as far as they are needed, from disk or from a server; outputs appear whole or not at all.
 
 use anyhow::{Context, Result, bail, ensure};
+use std::collections::BTreeMap;
 use std::fs;
 use std::fs::File;
 use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use tetralod::format::DecodeOptions;
-use tetralod::mesh::RepairLevel;
-use tetralod::mt::{Mt, MtInfo};
+use tetralod::format::{DecodeOptions, EncodeOptions, encode_to};
+use tetralod::mt::{Exact, Mt, MtInfo};
 use tetralod::session::{Client, Session};
 use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, Traffic, WantedRange};
 use tetralod::stream::{HttpOptions, HttpSource};
@@ -147,6 +147,12 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
     placed.with_context(failed)
 }
 
+/// Writes an MT with all that its file may keep of it; returns how many bytes that has.
+pub fn write_mt(path: &Path, mt: &Mt, exact: Vec<Exact>, metadata: BTreeMap<String, String>) -> Result<u64> {
+    let options = EncodeOptions { check_margins: true, exact, histograms: true, metadata };
+    write_file(path, |out| Ok(encode_to(mt, &options, out)?))
+}
+
 /// Works in a folder beside the place of an output; it is gone afterwards, also if the work fails.
 pub fn in_folder_beside<T>(path: &Path, work: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
     let folder = {
@@ -276,11 +282,6 @@ impl Opened {
             metadata.find(|(key, _)| *key == Construction::METADATA_KEYS[0]).map(|(_, value)| value.as_str());
         let found = Method::ALL.into_iter().find(|m| Some(m.name()) == method);
         if found.is_none_or(Method::keeps_the_mesh) { Reference::Mesh } else { Reference::Points }
-    }
-
-    /// How the input was mended, by what the builder wrote into the file.
-    pub fn repair_level(&self) -> RepairLevel {
-        RepairLevel::from_metadata(self.session.metadata())
     }
 }
 

@@ -10,18 +10,6 @@ use tetralod_build::verify::Reference;
 use tetralod_io as io;
 use tetralod_io::{CellData, FieldSelection, MemoryLimit, ReadOptions, ReadReason, Step};
 
-/// Reads the time steps in `paths`, each a mesh or a list of such, as one mesh, and mends it at this level. Points
-/// without any cell are as they are.
-///
-/// The first step is kept with all that is wanted, of later ones nothing but their fields.
-pub fn read(
-    paths: &[PathBuf],
-    wanted: &FieldSelection<'_>,
-    level: RepairLevel,
-) -> Result<(TetMesh, RepairReport)> {
-    read_as(paths, wanted, level, Source::default())
-}
-
 /// What is known of an input beside its paths.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Source<'a> {
@@ -61,23 +49,11 @@ pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
     }
 }
 
-/// As [`read`], with what is known of the source.
-pub fn read_as(
-    paths: &[PathBuf],
-    wanted: &FieldSelection<'_>,
-    level: RepairLevel,
-    source: Source<'_>,
-) -> Result<(TetMesh, RepairReport)> {
-    let (mut mesh, report) = read_cells(paths, wanted, level, source, false)?;
-    if wanted.cells == CellData::Values {
-        mesh.cells_to_points();
-    }
-    mesh.add_geometry_fields(wanted.names);
-    Ok((mesh, report))
-}
-
-/// As [`read_as`], but fields at cells stay there, and there are no fields of the geometry. A regular grid may come `alone`, without
-/// points and tetrahedra: it is not mended.
+/// Reads the time steps in `paths`, each a mesh or a list of such, as one mesh, and mends it at this level. Points
+/// without any cell are as they are; fields at cells stay there. A regular grid may come `alone`, without points and tetrahedra: it is not
+/// mended.
+///
+/// The first step is kept with all that is wanted, of later ones nothing but their fields.
 pub fn read_cells(
     paths: &[PathBuf],
     wanted: &FieldSelection<'_>,
@@ -193,7 +169,8 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
     let wanted = FieldSelection { names: &[], all: true, labels: &[], cells: CellData::LeaveOut };
-    let (mesh, report) = read(&[path.to_owned()], &wanted, RepairLevel::Safe)?;
+    let (mesh, report) =
+        read_cells(&[path.to_owned()], &wanted, RepairLevel::Safe, Source::default(), false)?;
     expect_cells(&mesh, path)?;
     Ok((mesh, report))
 }
@@ -214,7 +191,7 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
     let time = fields.first().and_then(|field| field.time);
     let is_one = fields.iter().all(|field| field.time == time);
     let step = time.filter(|_| is_one).map(|time| step_at(paths, time)).transpose()?.flatten();
-    let level = opened.repair_level();
+    let level = RepairLevel::from_metadata(opened.session.metadata());
     let (mut mesh, _) = read_cells(paths, &wanted, level, Source { step, ..Source::default() }, true)?;
     let is_known = |name: &String| mesh.fields.iter().any(|field| field.answers_to(name));
     if mesh.is_grid_alone() && !names.iter().all(is_known) {

@@ -6,7 +6,6 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;
-use tetralod::format::{EncodeOptions, encode_to};
 use tetralod_build::parts::Node;
 use tetralod_build::{BuildResult, BuildSummary};
 
@@ -47,9 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
     files::check_output(output, &parts)?;
     let (BuildResult { mt, summary, exact, .. }, plan) = parts::assemble(folder, verbosity)?;
-    let options =
-        EncodeOptions { check_margins: true, exact, histograms: true, metadata: plan.metadata().clone() };
-    let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
+    let file_bytes = files::write_mt(output, &mt, exact, plan.metadata().clone())?;
     let mut rows = vec![("file", output.display().to_string())];
     rows.extend(build::report::rows_of(&summary));
     rows.push(("file size", output::bytes(file_bytes)));

@@ -33,7 +33,7 @@ pub struct Group {
     error: Option<Tolerance>,
     /// Only inside this box, in model units; the mesh is as coarse as possible elsewhere. Regions are repeatable: their
     /// union is taken
-    #[arg(long = "box", value_name = "x0,y0,z0,x1,y1,z1", value_parser = parse_box, allow_hyphen_values = true)]
+    #[arg(long = "box", value_name = "x0,y0,z0,x1,y1,z1", value_parser = |text: &str| parse_bounds(text).map(Region::Box), allow_hyphen_values = true)]
     boxes: Vec<Region>,
     /// Only inside this oriented box: its centre, and three orthogonal vectors from the centre to the middles of faces
     #[arg(
@@ -71,7 +71,7 @@ pub struct Group {
     #[arg(
         long,
         value_name = "m0,…,m15",
-        value_parser = parse_matrix,
+        value_parser = |text: &str| parse_numbers::<16>(text, "a matrix"),
         requires = "viewport",
         allow_hyphen_values = true
     )]
@@ -392,10 +392,6 @@ fn checked(region: Region) -> Result<Region, String> {
     Ok(region)
 }
 
-fn parse_box(text: &str) -> Result<Region, String> {
-    parse_bounds(text).map(Region::Box)
-}
-
 fn parse_oriented_box(text: &str) -> Result<Region, String> {
     let numbers: [f64; 12] = parse_numbers(text, "an oriented box")?;
     let vector = |i: usize| [numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]];
@@ -432,10 +428,6 @@ fn parse_convex(text: &str) -> Result<Region, String> {
         return Err("a plane has 4 numbers".to_owned());
     }
     checked(Region::Convex(planes.to_vec()))
-}
-
-fn parse_matrix(text: &str) -> Result<[f64; 16], String> {
-    parse_numbers(text, "a matrix")
 }
 
 fn parse_viewport(text: &str) -> Result<[f64; 2], String> {

@@ -1,6 +1,7 @@
 //! What stands on the command line: numbers, alone, in lists, with a percent sign or a unit, and names of a list.
 
 use anyhow::Context;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::str::FromStr;
 use tetralod::geom::Bounds;
 use tetralod::view::Plane;
@@ -102,6 +103,12 @@ pub fn parse_size(text: &str) -> Result<f64, String> {
     if number >= 0.0 { Ok(number) } else { Err(format!("'{text}' is negative")) }
 }
 
+/// A number that is larger than 0.
+pub fn parse_positive(text: &str) -> Result<f64, String> {
+    let number = parse_number(text)?;
+    if number > 0.0 { Ok(number) } else { Err(format!("'{text}' is not larger than 0")) }
+}
+
 /// A part of 1, or a percentage.
 pub fn parse_share(text: &str) -> Result<f64, String> {
     let (number, percent) = percentage(text)?;
@@ -123,6 +130,18 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
     let number = parse_size(digits)? * f64::from(1_u32 << shift);
     // The largest number of bytes that a float still counts one by one.
     if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too large")) }
+}
+
+/// A number that `fits`; `expected` says which do.
+pub fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> anyhow::Result<f64> {
+    text.trim().parse().ok().filter(|x| fits(*x)).with_context(|| format!("it must be {expected}"))
+}
+
+/// Names for the help, and what each stands for.
+pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    all: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.map(|(name, _)| name)).try_map(move |name| named(&name, &all))
 }
 
 /// What has this name.

@@ -20,17 +20,19 @@ use tetralod_io::Pieces;
 
 /// Parses `I/N`: a part and how many there are.
 pub fn of_all(text: &str) -> Result<[u32; 2]> {
-    let numbers =
-        text.split_once('/').and_then(|(i, n)| Some([i.trim().parse().ok()?, n.trim().parse().ok()?]));
-    numbers.filter(|[i, n]| i < n).context("it must be I/N, as 0/8 for the first of eight")
+    numbers(text).filter(|[i, n]| i < n).context("it must be I/N, as 0/8 for the first of eight")
 }
 
 /// Parses `L/K`: a level and a number there.
 pub fn node(text: &str) -> Result<Node> {
-    let numbers =
-        text.split_once('/').and_then(|(l, k)| Some((l.trim().parse().ok()?, k.trim().parse().ok()?)));
-    let (level, index) = numbers.context("it must be L/K, as 1/0 for the first of level 1")?;
+    let [level, index] = numbers(text).context("it must be L/K, as 1/0 for the first of level 1")?;
     Ok(Node { level, index })
+}
+
+/// Two numbers with a slash between them.
+fn numbers(text: &str) -> Option<[u32; 2]> {
+    let (one, other) = text.split_once('/')?;
+    Some([one.trim().parse().ok()?, other.trim().parse().ok()?])
 }
 
 /// The file that says which steps there are.
@@ -140,14 +142,8 @@ impl Folder<'_> {
     }
 
     /// Builds or joins all nodes of a level, some of them at a time, each by one thread; a node that is alone, by all.
-    fn make_level(
-        &self,
-        plan: &Plan,
-        level: u32,
-        nodes: u32,
-        side_by_side: usize,
-        verbosity: &Verbosity,
-    ) -> Result<()> {
+    fn make_level(&self, plan: &Plan, level: u32, nodes: u32, verbosity: &Verbosity) -> Result<()> {
+        let side_by_side = rayon::current_num_threads().min(plan.parts() as usize);
         let bar = progress_bar(verbosity, "")?;
         bar.set_length(u64::from(nodes) * PER_NODE);
         bar.set_message(if level == 0 { "build parts" } else { "join parts" });
@@ -227,19 +223,25 @@ impl Folder<'_> {
     }
 
     fn read(&self, path: &Path, made_by: &str) -> Result<Part> {
-        let what = || missing(path, made_by);
-        let file = File::open(path).with_context(what)?;
-        Part::read(&mut BufReader::new(file)).with_context(what)
+        read(path, made_by, Part::read)
     }
 
     /// The plan, as any of the parts has it: this one.
     fn plan(&self, of: Node) -> Result<Plan> {
-        let path = self.built(of);
-        let step = if of.level == 0 { "build --part" } else { "join --node" };
-        let what = || missing(&path, &format!("`tetralod {step}`"));
-        let file = File::open(&path).with_context(what)?;
-        Plan::read(&mut BufReader::new(file)).with_context(what)
+        let step = if of.level == 0 { "`tetralod build --part`" } else { "`tetralod join --node`" };
+        read(&self.built(of), step, |file| Plan::read(file))
     }
+}
+
+/// Reads a file that another step has made.
+fn read<T>(
+    path: &Path,
+    made_by: &str,
+    read: impl FnOnce(&mut BufReader<File>) -> Result<T, PartsError>,
+) -> Result<T> {
+    let what = || missing(path, made_by);
+    let file = File::open(path).with_context(what)?;
+    read(&mut BufReader::new(file)).with_context(what)
 }
 
 fn missing(path: &Path, made_by: &str) -> String {
@@ -290,9 +292,7 @@ impl Step {
 pub fn build_part(inputs: &[PathBuf], [index, all]: [u32; 2], verbosity: &Verbosity) -> Result<()> {
     let [folder] = inputs else { bail!("--part takes one folder, the one that `tetralod part` has written") };
     let folder = Folder(folder);
-    let path = folder.parted(index);
-    let what = || missing(&path, "`tetralod part`");
-    let plan = Plan::read(&mut BufReader::new(File::open(&path).with_context(what)?)).with_context(what)?;
+    let plan = read(&folder.parted(index), "`tetralod part`", |file| Plan::read(file))?;
     if plan.parts() != all {
         bail!("{} has {} parts, not {all}", folder.0.display(), plan.parts());
     }
@@ -347,35 +347,29 @@ pub enum Whole<'a> {
     Pieces(InPieces<'a>),
 }
 
-/// A mesh that is built in parts by one process.
-pub struct Parting<'a> {
-    pub whole: Whole<'a>,
-    pub config: &'a BuildConfig,
-    pub count: u32,
-    pub metadata: BTreeMap<String, String>,
-    /// How many parts are built at a time.
-    pub side_by_side: usize,
-}
-
-impl Parting<'_> {
-    /// Builds it, in a folder beside the output that is gone afterwards.
-    ///
-    /// None, with the reason, if pieces of it cannot be parted one by one.
-    pub fn build(self, output: &Path, verbosity: &Verbosity) -> Result<Result<BuildResult, PartsError>> {
-        files::in_folder_beside(output, |path| {
-            let folder = Folder(path);
-            let Self { whole, config, count, metadata, side_by_side } = self;
-            let plan = match whole {
-                Whole::Mesh(mesh) => folder.part(&mesh, config, count, metadata)?,
-                Whole::Pieces(input) => match folder.part_pieces(&input, config, count, metadata)? {
-                    Ok(plan) => plan,
-                    Err(why) => return Ok(Err(why)),
-                },
-            };
-            for (level, nodes) in (0..).zip(plan.levels()) {
-                folder.make_level(&plan, level, nodes, side_by_side, verbosity)?;
-            }
-            folder.assemble(&plan, verbosity).map(Ok)
-        })
-    }
+/// Builds a mesh in so many parts by one process, as many at a time as there are threads, in a folder beside the output that is gone
+/// afterwards.
+///
+/// None, with the reason, if pieces of it cannot be parted one by one.
+pub fn build(
+    whole: Whole<'_>,
+    config: &BuildConfig,
+    (count, metadata): (u32, BTreeMap<String, String>),
+    output: &Path,
+    verbosity: &Verbosity,
+) -> Result<Result<BuildResult, PartsError>> {
+    files::in_folder_beside(output, |path| {
+        let folder = Folder(path);
+        let plan = match whole {
+            Whole::Mesh(mesh) => folder.part(&mesh, config, count, metadata)?,
+            Whole::Pieces(input) => match folder.part_pieces(&input, config, count, metadata)? {
+                Ok(plan) => plan,
+                Err(why) => return Ok(Err(why)),
+            },
+        };
+        for (level, nodes) in (0..).zip(plan.levels()) {
+            folder.make_level(&plan, level, nodes, verbosity)?;
+        }
+        folder.assemble(&plan, verbosity).map(Ok)
+    })
 }

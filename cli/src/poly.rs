@@ -127,11 +127,13 @@ pub fn write_table(path: &Path, table: &[(String, Vec<f64>)]) -> Result<()> {
     files::write_file(path, |out| Ok(write_csv(table, out)?))
 }
 
+/// The columns of a table with these places.
+pub fn coordinates(places: impl Iterator<Item = [f64; 3]> + Clone) -> [(String, Vec<f64>); 3] {
+    [(0, "x"), (1, "y"), (2, "z")].map(|(i, name)| (name.to_owned(), places.clone().map(|p| p[i]).collect()))
+}
+
 fn points_table(data: &PolyData) -> Vec<(String, Vec<f64>)> {
-    let mut table: Vec<(String, Vec<f64>)> = Vec::new();
-    for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table.push((name.to_owned(), data.positions.iter().map(|p| p[i]).collect()));
-    }
+    let mut table = Vec::from(coordinates(data.positions.iter().copied()));
     for (i, name) in ["nx", "ny", "nz"].into_iter().enumerate().filter(|_| !data.normals.is_empty()) {
         table.push((name.to_owned(), data.normals.iter().map(|n| f64::from(n[i])).collect()));
     }

@@ -2,7 +2,7 @@
 
 use super::output;
 use super::parse::parse_numbers;
-use super::poly::Target;
+use super::poly::{Target, coordinates};
 use super::query::{Answer, Query};
 use anyhow::{Context, Result};
 use serde::Serialize;
@@ -43,16 +43,12 @@ struct What {
     #[arg(long = "points", value_name = "FILE")]
     list: Option<PathBuf>,
     /// A line between two points, in model units.
-    #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = parse_line, allow_hyphen_values = true)]
+    #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = |text: &str| parse_numbers::<6>(text, "a line"), allow_hyphen_values = true)]
     line: Option<[f64; 6]>,
 }
 
 pub fn parse_point(text: &str) -> Result<[f64; 3], String> {
     parse_numbers(text, "a point")
-}
-
-fn parse_line(text: &str) -> Result<[f64; 6], String> {
-    parse_numbers(text, "a line")
 }
 
 /// The result as programs get it.
@@ -220,9 +216,7 @@ fn table(found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> Vec
     if found.length.is_some() {
         table.push(("distance".to_owned(), column(&|sample| sample.distance)));
     }
-    for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table.push((name.to_owned(), column(&|sample| Some(sample.position[i]))));
-    }
+    table.extend(coordinates(found.samples.iter().map(|sample| sample.position)));
     table.push(("tetrahedron".to_owned(), column(&|sample| sample.place.map(|place| f64::from(place.tet)))));
     for (name, values) in names.iter().zip(columns) {
         table.push((name.clone(), values.iter().map(|value| value.unwrap_or(f64::NAN)).collect()));

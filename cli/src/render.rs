@@ -2,11 +2,10 @@
 
 mod shown;
 
-use super::parse::{parse_number, parse_numbers};
+use super::parse::{one_of, parse_numbers, parse_positive};
 use super::query::{Query, Summary};
 use super::{files, output};
 use anyhow::{Context, Result, anyhow};
-use clap::ValueEnum;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use shown::{About, Shown};
@@ -51,7 +50,7 @@ pub struct Arguments {
         value_parser = parse_dimensions,
         help_heading = PICTURE
     )]
-    size: Dimensions,
+    size: [u32; 2],
     /// How many pictures, from a little beside one another, the picture is the mean of: more are smoother.
     #[arg(
         long,
@@ -71,63 +70,42 @@ pub struct Arguments {
 #[command(next_help_heading = CAMERA)]
 struct Placed {
     /// The side from which it is seen; home is the front, a little from the right and from above.
-    #[arg(long, value_name = "SIDE", default_value = "home", allow_hyphen_values = true)]
-    from: Side,
+    #[arg(long, value_name = "SIDE", value_parser = one_of(SIDES), default_value = "home", allow_hyphen_values = true)]
+    from: ViewPreset,
     /// Then go around it: to the right and upwards, in degrees.
     #[arg(
         long,
         value_name = "YAW,PITCH",
-        value_parser = parse_turn,
+        value_parser = |text: &str| parse_numbers::<2>(text, "a turn"),
         default_value = "0,0",
         hide_default_value = true,
         allow_hyphen_values = true
     )]
-    turn: Turn,
+    turn: [f64; 2],
     /// Magnify: 1 shows all of the model, 2 half of its width.
-    #[arg(long, value_name = "F", value_parser = parse_zoom, default_value = "1", allow_hyphen_values = true)]
+    #[arg(long, value_name = "F", value_parser = parse_positive, default_value = "1", allow_hyphen_values = true)]
     zoom: f64,
     /// What is farther away does not look smaller.
     #[arg(long)]
     orthographic: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Side {
-    Home,
-    #[value(name = "+x")]
-    PlusX,
-    #[value(name = "-x")]
-    MinusX,
-    #[value(name = "+y")]
-    PlusY,
-    #[value(name = "-y")]
-    MinusY,
-    #[value(name = "+z")]
-    PlusZ,
-    #[value(name = "-z")]
-    MinusZ,
-}
+/// Sides to look from.
+const SIDES: [(&str, ViewPreset); 7] = [
+    ("home", ViewPreset::Home),
+    ("+x", ViewPreset::AgainstX),
+    ("-x", ViewPreset::AlongX),
+    ("+y", ViewPreset::AgainstY),
+    ("-y", ViewPreset::AlongY),
+    ("+z", ViewPreset::AgainstZ),
+    ("-z", ViewPreset::AlongZ),
+];
 
-#[derive(Clone, Copy, Debug)]
-struct Dimensions([u32; 2]);
-
-#[derive(Clone, Copy, Debug)]
-struct Turn([f64; 2]);
-
-fn parse_dimensions(text: &str) -> Result<Dimensions, String> {
+fn parse_dimensions(text: &str) -> Result<[u32; 2], String> {
     let wrong = || format!("'{text}' is no width and height in pixels, such as 1280x960");
     let (width, height) = text.split_once('x').ok_or_else(wrong)?;
     let [width, height] = [width, height].map(|side| side.trim().parse().ok().filter(|side| *side > 0));
-    Ok(Dimensions([width.ok_or_else(wrong)?, height.ok_or_else(wrong)?]))
-}
-
-fn parse_turn(text: &str) -> Result<Turn, String> {
-    parse_numbers(text, "a turn").map(Turn)
-}
-
-fn parse_zoom(text: &str) -> Result<f64, String> {
-    let zoom = parse_number(text)?;
-    if zoom > 0.0 { Ok(zoom) } else { Err(format!("'{text}' is not larger than 0")) }
+    Ok([width.ok_or_else(wrong)?, height.ok_or_else(wrong)?])
 }
 
 fn parse_png(text: &str) -> Result<PathBuf, String> {
@@ -141,16 +119,8 @@ impl Placed {
         if self.orthographic {
             camera.set_projection(Projection::Orthographic);
         }
-        camera.turn_to(match self.from {
-            Side::Home => ViewPreset::Home,
-            Side::PlusX => ViewPreset::AgainstX,
-            Side::MinusX => ViewPreset::AlongX,
-            Side::PlusY => ViewPreset::AgainstY,
-            Side::MinusY => ViewPreset::AlongY,
-            Side::PlusZ => ViewPreset::AgainstZ,
-            Side::MinusZ => ViewPreset::AlongZ,
-        });
-        let [yaw, pitch] = self.turn.0.map(f64::to_radians);
+        camera.turn_to(self.from);
+        let [yaw, pitch] = self.turn.map(f64::to_radians);
         camera.orbit(yaw, pitch);
         camera.fit(bounds, aspect);
         camera.zoom(1.0 / self.zoom);
@@ -208,7 +178,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     files::check_output(output, arguments.query.files().chain(arguments.shown.files()))?;
     // Whether it can draw shows before anything is read.
-    let Dimensions(size) = arguments.size;
+    let size = arguments.size;
     let renderer = renderer(size)?;
     let mut answer = arguments.query.answer()?;
     let start = Instant::now();

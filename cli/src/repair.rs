@@ -1,7 +1,7 @@
 //! Options of repair, and what was done and found, as programs get it.
 
-use super::parse::named;
-use anyhow::{Context, Result};
+use super::parse::{named, number};
+use anyhow::Result;
 use serde::Serialize;
 use tetralod::mesh::{MeshFindings, RepairLevel, RepairReport, TetMesh, findings};
 
@@ -22,8 +22,7 @@ fn level(text: &str) -> Result<RepairLevel> {
 }
 
 fn distance(text: &str) -> Result<f64> {
-    let number = text.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
-    number.context("it must be a number that is not negative")
+    number(text, |x| (0.0..f64::INFINITY).contains(&x), "a number that is not negative")
 }
 
 impl RepairOptions {

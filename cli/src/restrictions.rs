@@ -1,5 +1,6 @@
 //! What a build must keep: the options that say so, and what is reported of it.
 
+use super::parse::number;
 use super::{files, output};
 use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
@@ -45,16 +46,11 @@ impl RestrictionOptions {
 }
 
 fn degrees(text: &str, least: f64, most: f64) -> Result<f64> {
-    let degrees: Option<f64> = text.trim().parse().ok();
-    let degrees = degrees.filter(|x| (least..=most).contains(x));
-    degrees.with_context(|| format!("it must be {least} to {most} degrees"))
+    number(text, |x| (least..=most).contains(&x), &format!("{least} to {most} degrees"))
 }
 
 fn length(text: &str) -> Result<f64> {
-    let length: Option<f64> = text.trim().parse().ok();
-    length
-        .filter(|x| (0.0..f64::INFINITY).contains(x))
-        .context("it must be a length in model units, not negative")
+    number(text, |x| (0.0..f64::INFINITY).contains(&x), "a length in model units, not negative")
 }
 
 /// A place in each line, its coordinates parted by blanks or commas. Lines may be empty, or begin with `#`.

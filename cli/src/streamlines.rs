@@ -1,8 +1,8 @@
 //! `tetralod streamlines`: the lines along which a vector field flows.
 
 use super::output;
-use super::parse::{parse_number, parse_numbers};
-use super::poly::Target;
+use super::parse::{parse_numbers, parse_positive};
+use super::poly::{Target, coordinates};
 use super::probe::parse_point;
 use super::query::Query;
 use anyhow::{Context, Result};
@@ -73,11 +73,6 @@ fn parse_seeds(text: &str) -> Result<SeedLine, String> {
         return Err("the number of seeds must be a whole number from 1 to 1000000".to_owned());
     }
     Ok(SeedLine { ends: [[x0, y0, z0], [x1, y1, z1]], count: count as u32 })
-}
-
-fn parse_positive(text: &str) -> Result<f64, String> {
-    let number = parse_number(text)?;
-    if number > 0.0 { Ok(number) } else { Err(format!("'{text}' is not larger than 0")) }
 }
 
 impl Seeds {
@@ -219,14 +214,12 @@ fn speed(point: &StreamPoint) -> f64 {
 fn table(lines: &Lines, columns: &[PointValues]) -> Vec<(String, Vec<f64>)> {
     let number = (0..).zip(&lines.lines).flat_map(|(i, line)| line.iter().map(move |_| f64::from(i)));
     let mut table = vec![("line".to_owned(), number.collect())];
-    let mut column = |name: &str, of: &dyn Fn(&StreamPoint) -> f64| {
-        table.push((name.to_owned(), lines.points.iter().map(of).collect()));
+    let column = |name: &str, of: &dyn Fn(&StreamPoint) -> f64| {
+        (name.to_owned(), lines.points.iter().map(of).collect::<Vec<f64>>())
     };
-    column("time", &|point| point.time);
-    for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
-        column(name, &|point| point.position[i]);
-    }
-    column("speed", &speed);
+    table.push(column("time", &|point| point.time));
+    table.extend(coordinates(lines.points.iter().map(|point| point.position)));
+    table.push(column("speed", &speed));
     table.extend(columns.iter().map(|column| (column.name.clone(), column.values.clone())));
     table
 }

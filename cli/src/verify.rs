@@ -94,8 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     report.add(verify::run_shown(&mut opened.session, &input, reference));
     bar.finish_and_clear();
-    print(arguments, &report, Took { memory_bytes: Some(about), bytes_read: None })?;
-    Ok(if report.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    print(arguments, &report, [Some(about), None])
 }
 
 /// A mesh of the whole domain is one that takes at most this part of the file, or so many bytes.
@@ -132,19 +131,17 @@ fn run_samples(arguments: &Arguments, count: u32) -> Result<ExitCode> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    print(arguments, &whole, Took { memory_bytes: None, bytes_read: Some(read) })?;
-    Ok(if whole.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    print(arguments, &whole, [None, Some(read)])
 }
 
-/// What a verification took.
-struct Took {
-    memory_bytes: Option<u64>,
-    bytes_read: Option<u64>,
-}
-
-fn print(arguments: &Arguments, report: &VerifyReport, took: Took) -> Result<()> {
+/// Prints what was found, and what that took.
+fn print(
+    arguments: &Arguments,
+    report: &VerifyReport,
+    [memory_bytes, bytes_read]: [Option<u64>; 2],
+) -> Result<ExitCode> {
     let &Arguments { quick, json, samples, .. } = arguments;
-    let (quick, Took { memory_bytes, bytes_read }) = (quick || samples.is_some(), took);
+    let quick = quick || samples.is_some();
     let VerifyReport { valid, queries, worst_error_ratio, ref failures, .. } = *report;
     let verdict = if valid { "every promise is kept" } else { "promises are broken" };
     let verdict = if samples.is_some() && valid { "every promise is kept by the samples" } else { verdict };
@@ -157,5 +154,6 @@ fn print(arguments: &Arguments, report: &VerifyReport, took: Took) -> Result<()>
     rows.extend(bytes_read.map(|bytes| ("read", format!("{} of the file", output::bytes(bytes)))));
     rows.extend(failures.iter().map(|failure| ("broken", failure.clone())));
     let report = Report { found: report, quick, memory_bytes, bytes_read };
-    output::result(json, &report, &rows)
+    output::result(json, &report, &rows)?;
+    Ok(if valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -25,6 +25,14 @@ impl Field {
         Self { name: name.into(), values, ..Self::default() }
     }
 
+    /// What is known of it, but for its values.
+    #[doc(hidden)]
+    pub fn without_values(&self) -> Self {
+        let Self { name, unit, vector, time, integer, .. } = self;
+        let (name, unit, vector) = (name.clone(), unit.clone(), vector.clone());
+        Self { name, values: Vec::new(), unit, vector, time: *time, integer: *integer }
+    }
+
     /// Whether a user who asks for `name` means this field: it has this name, or it is a component (not the length) of
     /// the vector of this name.
     pub fn answers_to(&self, name: &str) -> bool {

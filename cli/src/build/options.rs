@@ -1,10 +1,10 @@
 //! The options of building: what is built, and how.
 
-use crate::input;
 use crate::parse::named;
 use crate::refuse_usage;
 use crate::repair::RepairOptions;
 use crate::restrictions::RestrictionOptions;
+use crate::{input, parse};
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -36,15 +36,15 @@ pub struct BuildOptions {
     kind: Option<MtKind>,
     /// How it is built: collapse (edges, for kind edge), insert or decimate (vertices, for kind vertex)
     /// [default: collapse, decimate for kinds vertex and half-edge].
-    #[arg(long, value_name = "METHOD", value_parser = method)]
+    #[arg(long, value_name = "METHOD", value_parser = |text: &str| named(text, &Method::ALL.map(|method| (method.name(), method))))]
     method: Option<Method>,
     /// By what criterion vertices go or come: delaunay, or half-edge with decimate alone [default: half-edge with
     /// decimate].
-    #[arg(long, value_name = "CRITERION", value_parser = criterion)]
+    #[arg(long, value_name = "CRITERION", value_parser = |text: &str| named(text, &BuildCriterion::ALL.map(|criterion| (criterion.name(), criterion))))]
     criterion: Option<BuildCriterion>,
     /// What it is for, with decimate: uniform, the fewest tetrahedra at one error everywhere; or regions, which then take
     /// less around them with them [default: uniform].
-    #[arg(long = "for", value_name = "PURPOSE", value_parser = purpose)]
+    #[arg(long = "for", value_name = "PURPOSE", value_parser = |text: &str| named(text, &Purpose::ALL.map(|purpose| (purpose.name(), purpose))))]
     purpose: Option<Purpose>,
     /// Keep for each tetrahedron how far its own error is below that of the update that removes it: requests take fewer
     /// tetrahedra, but every one is answered from the base mesh. With --method insert only.
@@ -124,9 +124,9 @@ fn tolerance(text: &str) -> Result<Precision> {
         Some(percent) => (percent, |x| FieldPrecision::Fraction(x / 100.0)),
         None => (number, FieldPrecision::Units),
     };
-    let number = number.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
-    let number = number.context("it must be a number, or a percentage as 1%, or NAME= and that")?;
-    Ok(Precision { name, precision: unit(number) })
+    let is_size = |x| (0.0..f64::INFINITY).contains(&x);
+    let size = parse::number(number, is_size, "a number, or a percentage as 1%, or NAME= and that")?;
+    Ok(Precision { name, precision: unit(size) })
 }
 
 /// A part of the diagonal.
@@ -138,7 +138,7 @@ fn share(text: &str) -> Result<f64> {
 
 /// How many edges.
 fn lengths(text: &str) -> Result<f64> {
-    text.trim().parse().ok().filter(|x: &f64| *x >= 0.0).context("it must be a number of at least 0, or inf")
+    parse::number(text, |x| x >= 0.0, "a number of at least 0, or inf")
 }
 
 /// log2 of the updates of a block.
@@ -168,18 +168,6 @@ fn first_pair(text: &str) -> Result<(String, String)> {
         anyhow::bail!("a key must not be empty, '{method}', '{criterion}' or '{repair}'");
     }
     Ok((key.to_owned(), value.to_owned()))
-}
-
-fn method(text: &str) -> Result<Method> {
-    named(text, &Method::ALL.map(|method| (method.name(), method)))
-}
-
-fn criterion(text: &str) -> Result<BuildCriterion> {
-    named(text, &BuildCriterion::ALL.map(|criterion| (criterion.name(), criterion)))
-}
-
-fn purpose(text: &str) -> Result<Purpose> {
-    named(text, &Purpose::ALL.map(|purpose| (purpose.name(), purpose)))
 }
 
 impl BuildOptions {

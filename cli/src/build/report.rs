@@ -5,7 +5,7 @@ use crate::repair::Repair;
 use crate::restrictions::Angles;
 use serde::Serialize;
 use std::path::Path;
-use tetralod_build::{BuildConfig, BuildCriterion, BuildSummary};
+use tetralod_build::BuildSummary;
 
 /// The summary as programs get it.
 #[derive(Default, Serialize)]
@@ -32,34 +32,6 @@ pub(super) struct Report {
     /// What the reader left out of the input or changed, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-}
-
-/// A report of nothing but what was repaired.
-pub(super) fn repaired_as(repaired: String) -> Report {
-    Report { repaired, ..Report::default() }
-}
-
-pub(super) fn report(
-    config: &BuildConfig,
-    summary: &BuildSummary,
-    file_bytes: u64,
-    seconds: f64,
-    repaired: String,
-) -> Report {
-    Report {
-        kind: config.construction.kind().name(),
-        method: config.construction.method().name(),
-        criterion: config.construction.criterion().map(BuildCriterion::name),
-        counts: *summary,
-        interface_deviation: (config.preserve_within > 0.0).then_some(summary.interface_deviation),
-        file_bytes,
-        bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
-        seconds,
-        repaired,
-        repair: None,
-        angles: None,
-        notes: Vec::new(),
-    }
 }
 
 /// The counts of a build for people.

@@ -2,7 +2,7 @@
 
 use crate::needs::read_json;
 use crate::output;
-use crate::parse::{parse_bounds, parse_list, parse_number, parse_plane, parse_range, parse_share};
+use crate::parse::{one_of, parse_bounds, parse_list, parse_number, parse_plane, parse_range, parse_share};
 use crate::query::Query;
 use crate::usage::refuse_usage;
 use anyhow::Result;
@@ -72,7 +72,7 @@ pub struct Shown {
     #[arg(long, value_name = "NAME", help_heading = COLOURS)]
     colour_field: Option<String>,
     /// The colour map: viridis, magma, turbo, coolwarm, ... (a wrong name lists all) [default: viridis].
-    #[arg(long, value_name = "NAME", value_parser = parse_map, help_heading = COLOURS)]
+    #[arg(long, value_name = "NAME", value_parser = |text: &str| MapName::try_from(text.to_owned()), help_heading = COLOURS)]
     map: Option<MapName>,
     /// The values with the first and the last colour [default: the range of the field].
     #[arg(
@@ -90,8 +90,8 @@ pub struct Shown {
     #[arg(long, help_heading = COLOURS)]
     reversed: bool,
     /// What is behind everything [default: dark].
-    #[arg(long, value_name = "WHAT", help_heading = COLOURS)]
-    background: Option<Ground>,
+    #[arg(long, value_name = "WHAT", value_parser = one_of(GROUNDS), help_heading = COLOURS)]
+    background: Option<Background>,
 }
 
 /// Kinds of pictures.
@@ -125,12 +125,8 @@ impl Mode {
     }
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Ground {
-    Dark,
-    Light,
-    Transparent,
-}
+const GROUNDS: [(&str, Background); 3] =
+    [("dark", Background::Dark), ("light", Background::Light), ("transparent", Background::Transparent)];
 
 /// Values and opacities.
 #[derive(Clone, Debug)]
@@ -159,10 +155,6 @@ fn parse_opacity(text: &str) -> Result<f64, String> {
 fn parse_shrink(text: &str) -> Result<f64, String> {
     let shrink = parse_share(text)?;
     if shrink <= 0.95 { Ok(shrink) } else { Err(format!("'{text}' is more than 0.95")) }
-}
-
-fn parse_map(text: &str) -> Result<MapName, String> {
-    MapName::try_from(text.to_owned())
 }
 
 fn quantities() -> PossibleValuesParser {
@@ -321,13 +313,7 @@ impl Shown {
         colours.range = self.colour_range.or(colours.range);
         colours.log |= self.log;
         colours.reversed |= self.reversed;
-        if let Some(ground) = self.background {
-            state.background = match ground {
-                Ground::Dark => Background::Dark,
-                Ground::Light => Background::Light,
-                Ground::Transparent => Background::Transparent,
-            };
-        }
+        state.background = self.background.unwrap_or(state.background);
     }
 }
 

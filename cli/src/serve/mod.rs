@@ -16,7 +16,7 @@ use axum::middleware::{self, Next};
 use axum::response::Response;
 use futures_util::StreamExt;
 use futures_util::stream::unfold;
-use percent_encoding::percent_decode_str;
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 use std::io::Write;
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -42,6 +42,9 @@ const ACCEPTED: [HeaderName; 4] = [header::IF_MATCH, header::IF_NONE_MATCH, head
 
 /// What lets pages of other origins read an answer.
 const CORS: [HeaderName; 2] = [header::ACCESS_CONTROL_ALLOW_ORIGIN, header::ACCESS_CONTROL_EXPOSE_HEADERS];
+
+/// What is no plain character of an address.
+const RESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// What pages that are served may do: nothing that a page with volumes needs is among what is forbidden.
 const POLICY: &str = "base-uri 'self'; form-action 'self'; object-src 'none'";
@@ -153,7 +156,7 @@ async fn leads_out(root: &Path, file: PathBuf) -> bool {
 fn file(path: &Path) -> Result<(Router, String)> {
     let name = path.file_name().and_then(|name| name.to_str());
     let Some(name) = name else { bail!("{}: a name in UTF-8 is needed for the address", path.display()) };
-    let at = format!("/{}", encoded(name));
+    let at = format!("/{}", utf8_percent_encode(name, RESERVED));
     // Braces mean something in a route: the one file is therefore asked for by its exact address.
     let (file, only) = (ServeFile::new(path), at.clone());
     let guard = middleware::from_fn(move |request: Request, next: Next| {
@@ -161,18 +164,6 @@ fn file(path: &Path) -> Result<(Router, String)> {
         async move { if known { next.run(request).await } else { with_status(StatusCode::NOT_FOUND) } }
     });
     Ok((Router::new().fallback_service(file).layer(guard), at))
-}
-
-/// `name` as a part of an address.
-fn encoded(name: &str) -> String {
-    let mut out = String::new();
-    for byte in name.bytes() {
-        match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' => out.push(char::from(byte)),
-            _ => out.push_str(&format!("%{byte:02X}")),
-        }
-    }
-    out
 }
 
 fn with_status(status: StatusCode) -> Response {

@@ -174,17 +174,8 @@ fn vertex_mt(
         let above = mt.parents(u).iter().map(|&p| depths[p as usize]).max();
         depths.push(above.unwrap_or(0) + 1);
     }
-    let info = mt.info();
-    let summary = BuildSummary {
-        vertices: info.vertices,
-        tetrahedra: info.tetrahedra,
-        base_vertices: mt.base().positions.len() as u32,
-        base_tetrahedra: mt.base().tets.len() as u32,
-        updates: mt.updates(),
-        position_bits: info.lattice.bits,
-        depth: depths.into_iter().max().unwrap_or(0),
-        interface_deviation,
-    };
+    let summary = BuildSummary::of(mt.info(), mt.base(), depths.into_iter().max().unwrap_or(0));
+    let summary = BuildSummary { interface_deviation, ..summary };
     let exact = lattice::field_selection::exact_values(mesh, config, &vertices)?;
     Ok(BuildResult { mt: VertexMt::from_explicit(&mt)?.into(), summary, vertices, exact })
 }

@@ -14,7 +14,7 @@ mod angles;
 pub use angles::{CellAngles, CellsBelow};
 
 use glam::DVec3;
-use tetralod::geom::{Bounds, PointGrid, TetPlaces, TriangleGrid, weights_on_triangle};
+use tetralod::geom::{PointGrid, TetPlaces, TriangleGrid, weights_on_triangle};
 use tetralod::mesh::boundary_faces;
 use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo};
 
@@ -34,8 +34,6 @@ pub struct Reference<'a> {
 #[derive(Clone, Debug, Default)]
 #[doc(hidden)]
 pub struct Part {
-    /// Only at vertices in this box.
-    pub roi: Option<Bounds>,
     /// Only in tetrahedra in which the field has a value of one of these ranges; everywhere if empty.
     pub ranges: Vec<[f64; 2]>,
     /// The bounds that are guaranteed, if any.
@@ -84,8 +82,7 @@ pub struct Deviation {
 #[doc(hidden)]
 pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, part: &Part) -> Deviation {
     let measure = Measure { info, field: &info.fields[reference.field], mesh, reference, part };
-    let wanted = |(p, _): &(&[f64; 3], &f64)| part.roi.is_none_or(|roi| roi.contains(**p));
-    let pairs = reference.positions.iter().zip(reference.values).filter(wanted);
+    let pairs = reference.positions.iter().zip(reference.values);
     let mut points: Vec<Point> = pairs.map(|(p, value)| Point::new(*p, *value)).collect();
     let grid = PointGrid::new(points.iter().map(|p| info.lattice.nearest(p.place.to_array())).collect());
     for tet in mesh.tets() {

@@ -1,5 +1,6 @@
 //! The progress of a build, for callers that show it or stop the work.
 
+use crate::BuildError;
 use std::ops::ControlFlow;
 
 /// The progress of the work; sent now and then, so that a caller can show it and stop the work.
@@ -17,3 +18,20 @@ pub struct BuildProgress {
 
 /// Receives progress; [`ControlFlow::Break`] stops the work.
 pub type OnProgress<'a> = &'a mut dyn FnMut(BuildProgress) -> ControlFlow<()>;
+
+impl BuildProgress {
+    /// Passes it on; an error if that stops the work.
+    pub(crate) fn tell(self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        if progress(self).is_break() { Err(BuildError::Stopped) } else { Ok(()) }
+    }
+
+    /// Tells now and then how many of all updates have got their place in the order.
+    pub(crate) fn tell_ordered(
+        done: usize,
+        total: usize,
+        progress: OnProgress<'_>,
+    ) -> Result<(), BuildError> {
+        let at = Self { stage: "order", done: done as u64, total: total as u64, tetrahedra: None };
+        if done.is_multiple_of(4096) { at.tell(progress) } else { Ok(()) }
+    }
+}

@@ -1,7 +1,7 @@
 //! What a build makes.
 
 use serde::Serialize;
-use tetralod::mt::{Exact, Mt, VertexId};
+use tetralod::mt::{BaseMesh, Exact, Mt, MtInfo, VertexId};
 
 /// An MT, and facts about its construction.
 #[derive(Clone, Debug)]
@@ -36,4 +36,20 @@ pub struct BuildSummary {
     /// How far interfaces between regions have moved, in model units; see [`BuildConfig::preserve_within`](crate::BuildConfig::preserve_within).
     #[serde(skip)]
     pub interface_deviation: f64,
+}
+
+impl BuildSummary {
+    /// Of an MT with this base mesh.
+    pub(crate) fn of(info: &MtInfo, base: &BaseMesh, depth: u32) -> Self {
+        Self {
+            vertices: info.vertices,
+            tetrahedra: info.tetrahedra,
+            base_vertices: base.positions.len() as u32,
+            base_tetrahedra: base.tets.len() as u32,
+            updates: info.updates,
+            position_bits: info.lattice.bits,
+            depth,
+            interface_deviation: 0.0,
+        }
+    }
 }

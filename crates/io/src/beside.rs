@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::{Component, Path, PathBuf};
 
-use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::error::{At, ReadError, ReadReason};
 use crate::memory::{FileBytes, MemoryLimit};
 
 /// The files of a mesh: the one that was given, and those beside it as they are read.
@@ -33,7 +33,7 @@ impl<'a> FilesOf<'a> {
             Some(name) if path != self.given => self.load(name),
             _ => self.bytes_of(path, |e| ReadReason::Io(e.to_string())),
         };
-        bytes.at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
+        bytes.in_file(&path.display().to_string())
     }
 
     fn bytes_of(

@@ -166,17 +166,19 @@ fn prefix(place: &str) -> String {
 pub(super) trait At<T> {
     /// Turns the reason into an error at `place`; [`super::read_bytes`] adds the file.
     fn at(self, place: impl FnOnce() -> String) -> Result<T, ReadError>;
+
+    /// Turns the reason into an error of the whole file called `name`.
+    fn in_file(self, name: &str) -> Result<T, ReadError>;
 }
 
 impl<T> At<T> for Result<T, ReadReason> {
     fn at(self, place: impl FnOnce() -> String) -> Result<T, ReadError> {
         self.map_err(|reason| ReadError { file: String::new(), place: place(), reason })
     }
-}
 
-/// "1 hexahedron, 3 wedges".
-pub(super) fn named_counts(counts: &[(i64, u64)]) -> String {
-    counts.iter().map(|&(kind, count)| named_count(kind, count)).collect::<Vec<_>>().join(", ")
+    fn in_file(self, name: &str) -> Result<T, ReadError> {
+        self.at(String::new).map_err(|error| in_file(error, name))
+    }
 }
 
 /// "1 hexahedron", "3 wedges", "2 cells of type 99", "5 Lagrange tetrahedra of 20 points".
@@ -194,7 +196,8 @@ fn named_count(kind: i64, count: u64) -> String {
 /// Why cells of these types, and so many, are refused.
 fn of_cells(counts: &[(i64, u64)]) -> String {
     let total: u64 = counts.iter().map(|(_, count)| count).sum();
-    let list = named_counts(counts);
+    let list: Vec<String> = counts.iter().map(|&(kind, count)| named_count(kind, count)).collect();
+    let list = list.join(", ");
     if counts.iter().all(|(kind, _)| is_flat(*kind)) {
         return no_volume(&list);
     }

@@ -10,7 +10,7 @@ use crate::{cell_types, cells};
 use tetralod::mesh::{CellNumbers, Field, Grid, MeshInput, TetMesh, kuhn_tets};
 
 /// Most points of a grid: 512³. Its tetrahedra take some 13 GB.
-pub const MAX_GRID_POINTS: u64 = 1 << 27;
+pub(super) const MAX_GRID_POINTS: u64 = 1 << 27;
 
 /// First and last index along x, y and z.
 pub(super) type Extent = [i64; 6];

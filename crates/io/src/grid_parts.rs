@@ -4,6 +4,7 @@ use crate::CellData;
 use crate::error::{At, ReadError, ReadReason};
 use crate::grid::{Extent, Ghosts, GridValues, dims_in};
 use crate::vtu::PieceReader;
+use crate::xml::Document;
 use tetralod::mesh::Field;
 
 /// A grid whose values come in parts.
@@ -81,6 +82,12 @@ impl InParts {
             if cubes.iter().all(|part| part.fields.is_empty()) { names } else { assemble(cubes, inner)? };
         Ok(GridValues { fields, cubes, ghosts, others })
     }
+}
+
+/// The first and the last point of a whole grid along each axis.
+pub(super) fn whole_extent(document: &Document<'_>) -> Result<Extent, ReadReason> {
+    let whole = document.dataset.numbers("WholeExtent")?;
+    whole.ok_or_else(|| ReadReason::Missing("attribute WholeExtent".into()))
 }
 
 /// Where a piece lies in the grid.

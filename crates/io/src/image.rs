@@ -3,9 +3,9 @@
 use crate::contents::Survey;
 use crate::error::{At, ReadError, ReadReason};
 use crate::grid::{ALONG_THE_AXES, Extent, Placement, placed};
-use crate::grid_parts::InParts;
+use crate::grid_parts::{InParts, whole_extent};
 use crate::listed::for_each_file;
-use crate::vtu::{self, PieceReader};
+use crate::vtu;
 use crate::xml::Document;
 use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
@@ -20,11 +20,7 @@ pub(super) fn read(
     let (placement, whole) = read_placement(document).at(whole_place)?;
     let mut grid = InParts::default();
     let time = for_each_file(document, beside, &options.memory, &mut |file| {
-        for (number, piece) in file.full_pieces() {
-            let reader = PieceReader { document: file, piece, number, options };
-            grid.add(&reader, whole, Vec::new())?;
-        }
-        Ok(())
+        vtu::readers(file, options).try_for_each(|reader| grid.add(&reader, whole, Vec::new()))
     })?;
     let values = grid.finish(whole).at(whole_place)?;
     Ok((placement.mesh(values, &options.memory).at(whole_place)?, time))
@@ -39,9 +35,7 @@ pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
 
 fn read_placement(document: &Document<'_>) -> Result<(Placement, Extent), ReadReason> {
     let attributes = &document.dataset;
-    let whole: Extent = attributes
-        .numbers("WholeExtent")?
-        .ok_or_else(|| ReadReason::Missing("attribute WholeExtent".into()))?;
+    let whole = whole_extent(document)?;
     let origin = attributes.numbers("Origin")?.unwrap_or([0.0; 3]);
     let spacing: [f64; 3] = attributes.numbers("Spacing")?.unwrap_or([1.0; 3]);
     let direction: Option<[f64; 9]> = attributes.numbers("Direction")?;

@@ -12,6 +12,8 @@ use crate::grid::{self, Ghosts, GridValues, Placement};
 use crate::number::{NumberType, points_from};
 use crate::scanner::Scanner;
 use crate::{CellData, MemoryLimit, ReadOptions, Survey, cell_types, cells};
+use percent_encoding::percent_decode_str;
+use std::borrow::Cow;
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
 /// How every legacy file starts.
@@ -338,22 +340,7 @@ fn text(bytes: &[u8]) -> Result<&str, ReadReason> {
 
 /// Names are written with `%20` for a space and so on.
 fn decoded_name(name: &str) -> String {
-    let mut bytes = Vec::new();
-    let mut rest = name.as_bytes();
-    while let Some((&c, after)) = rest.split_first() {
-        let code = after.get(..2).and_then(|h| std::str::from_utf8(h).ok());
-        match code.filter(|_| c == b'%').and_then(|h| u8::from_str_radix(h, 16).ok()) {
-            Some(code) => {
-                bytes.push(code);
-                rest = &after[2..];
-            }
-            None => {
-                bytes.push(c);
-                rest = after;
-            }
-        }
-    }
-    String::from_utf8(bytes).unwrap_or_else(|_| name.to_owned())
+    percent_decode_str(name).decode_utf8().map_or_else(|_| name.to_owned(), Cow::into_owned)
 }
 
 /// What the attributes that follow belong to.

@@ -80,8 +80,6 @@ mod xz;
 
 pub use contents::Survey;
 pub use error::{ReadError, ReadReason};
-#[doc(hidden)]
-pub use grid::MAX_GRID_POINTS;
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
 #[doc(hidden)]
@@ -129,7 +127,7 @@ pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
 /// As [`read`]; a field that is wanted and not there is no error.
 pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let read = read_unexpanded(path, options)?;
-    expanded(read, options).at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
+    expanded(read, options).in_file(&path.display().to_string())
 }
 
 /// The mesh as callers get it: finite numbers at points that no cell uses, no cells that fold because they were cut into straight
@@ -163,7 +161,7 @@ pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, Re
 fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let name = path.display().to_string();
     if path.is_dir() {
-        return Err(foreign::refused_folder(path)).at(String::new).map_err(|error| in_file(error, &name));
+        return Err(foreign::refused_folder(path)).in_file(&name);
     }
     let files = FilesOf::new(path, &options.memory);
     let mut mesh = match lower_extension(path).as_str() {
@@ -210,7 +208,7 @@ pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Resul
         Err(ReadReason::unsupported(what, "give it by its path, with the other beside it"))
     };
     let read = read_in(name, bytes, options, &alone).map(settled)?;
-    expanded(read, options).at(String::new).map_err(|e| in_file(e, name))
+    expanded(read, options).in_file(name)
 }
 
 /// Reads a file that may refer to others.
@@ -220,7 +218,7 @@ fn read_in(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Result<TetMesh, ReadError> {
-    let unpacked = packed::unpacked(bytes, &options.memory).at(String::new).map_err(|e| in_file(e, name))?;
+    let unpacked = packed::unpacked(bytes, &options.memory).in_file(name)?;
     let (bytes, name) = (&*unpacked, without_gz(name));
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
@@ -245,7 +243,7 @@ pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, R
     let options = ReadOptions::default();
     let mesh =
         raw::Sidecar::parse(sidecar).and_then(|s| expanded(s.mesh(samples, &options.memory)?, &options));
-    mesh.at(String::new).map_err(|e| in_file(e, name))
+    mesh.in_file(name)
 }
 
 fn read_raw_by_sidecar(
@@ -255,18 +253,14 @@ fn read_raw_by_sidecar(
     memory: &MemoryLimit,
 ) -> Result<TetMesh, ReadError> {
     let name = sidecar_path.display().to_string();
-    let sidecar =
-        raw::Sidecar::parse(&files.load_one(sidecar_path)?).at(String::new).map_err(|e| in_file(e, &name))?;
+    let sidecar = raw::Sidecar::parse(&files.load_one(sidecar_path)?).in_file(&name)?;
     let samples_path = match (samples_path, &sidecar.file) {
         (Some(path), _) => path.to_owned(),
         (None, Some(file)) => sidecar_path.with_file_name(file),
         (None, None) => sidecar_path.with_extension("raw"),
     };
     let samples = files.load_one(&samples_path)?;
-    sidecar
-        .mesh(&samples, memory)
-        .at(String::new)
-        .map_err(|e| in_file(e, &samples_path.display().to_string()))
+    sidecar.mesh(&samples, memory).in_file(&samples_path.display().to_string())
 }
 
 fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {

@@ -13,8 +13,8 @@ use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::settle_unused;
 use crate::file_kind::without_mark;
 use crate::listed::for_each_file;
-use crate::pvtu::bits;
-use crate::vtu::{PieceReader, first_number};
+use crate::pvtu::{bits, numbered};
+use crate::vtu::{PieceReader, in_order};
 use crate::xml::Document;
 use crate::{ReadOptions, packed};
 use tetralod::mesh::{Field, MeshPiece, Middles, TetMesh};
@@ -49,10 +49,7 @@ impl Pieces {
     /// If the list cannot be read or is damaged.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Option<Self>, ReadError> {
         let bytes = load(path, &options.memory)?;
-        let bytes = packed::unpacked(&bytes, &options.memory)
-            .at(String::new)
-            .map_err(|e| in_file(e, &path.display().to_string()))?
-            .to_vec();
+        let bytes = packed::unpacked(&bytes, &options.memory).in_file(&path.display().to_string())?.to_vec();
         if super::format_of(&bytes) != Some("pvtu") {
             return Ok(None);
         }
@@ -182,27 +179,21 @@ struct Seen {
     fields: Option<[Vec<Field>; 2]>,
 }
 
-/// The numbers of a piece's points.
-#[derive(Default)]
-struct Numbered {
-    numbers: Vec<u32>,
-    /// The points that no earlier piece has.
-    new: Vec<usize>,
-    /// The others, each with its number and its place in [`Seen::first`].
-    old: Vec<(usize, u32, usize)>,
-}
-
 impl Seen {
     fn read(&mut self, reader: &PieceReader<'_, '_>) -> Result<MeshPiece, ReadError> {
-        let mut numbered = Numbered::default();
+        let (mut numbers, mut new) = (Vec::new(), Vec::new());
         let mut mesh = reader.read(&mut |points| {
-            numbered = self.numbered(points)?;
-            Ok(Numbering::Each(numbered.numbers.clone()))
+            // Of most points it is known without a look into the table that it does not have them.
+            let is_known = |point| self.several.binary_search(&hash(point)).is_ok();
+            let known = |point| self.known.get(&bits(point)).filter(|_| is_known(point));
+            (numbers, new) = numbered(points, self.points, |point| known(point).map(|(number, _)| *number))?;
+            Ok(Numbering::Each(numbers.clone()))
         })?;
         let place = || format!("piece {}, <PointData>", reader.number);
         match &self.fields {
             None => {
-                let names = |fields: &[Field]| fields.iter().map(without_values).collect::<Vec<Field>>();
+                let names =
+                    |fields: &[Field]| fields.iter().map(Field::without_values).collect::<Vec<Field>>();
                 self.fields = Some([names(&mesh.fields), names(&mesh.cell_fields)]);
             }
             Some([fields, cell_fields]) => {
@@ -211,24 +202,27 @@ impl Seen {
             }
         }
         let first = self.points as u32;
-        let old: HashMap<u32, u32> = numbered.old.iter().map(|&(i, number, _)| (number, i as u32)).collect();
+        // The points that an earlier piece has.
+        let old: Vec<usize> = (0..numbers.len()).filter(|&i| numbers[i] < first).collect();
+        let place: HashMap<u32, u32> = old.iter().map(|&i| (numbers[i], i as u32)).collect();
         let own = |number: u32| match number.checked_sub(first) {
-            Some(rank) => numbered.new[rank as usize] as u32,
-            None => old[&number],
+            Some(rank) => new[rank as usize] as u32,
+            None => place[&number],
         };
         mesh.tets.iter_mut().for_each(|tet| *tet = tet.map(own));
         let count = mesh.fields.len();
-        for &(i, _, at) in &numbered.old {
+        for i in old {
+            let (_, at) = self.known[&bits(mesh.positions[i])];
             mesh.positions[i] = self.first[at];
             for (f, field) in mesh.fields.iter_mut().enumerate() {
                 field.values[i] = self.values[at * count + f];
             }
         }
-        for &i in &numbered.new {
+        for &i in &new {
             let position = mesh.positions[i];
             let has_values = mesh.fields.iter().all(|field| field.values[i].is_finite());
             if has_values && self.several.binary_search(&hash(position)).is_ok() {
-                let (number, at) = (numbered.numbers[i], self.first.len());
+                let (number, at) = (numbers[i], self.first.len());
                 if let std::collections::hash_map::Entry::Vacant(entry) = self.known.entry(bits(position)) {
                     entry.insert((number, at));
                     self.first.push(position);
@@ -236,62 +230,10 @@ impl Seen {
                 }
             }
         }
-        self.points += numbered.new.len();
+        self.points += new.len();
         settle_unused(&mut mesh);
         // A piece alone cannot know which of its points others move.
         mesh.input.middles = Middles::default();
-        Ok(MeshPiece { points: numbered.numbers, mesh })
+        Ok(MeshPiece { points: numbers, mesh })
     }
-
-    /// As the whole numbers them.
-    fn numbered(&self, points: &[[f64; 3]]) -> Result<Numbered, ReadReason> {
-        first_number(self.points, points.len())?;
-        let mut found = Numbered::default();
-        let mut taken = std::collections::HashSet::new();
-        for (i, &point) in points.iter().enumerate() {
-            let may_be_known = self.several.binary_search(&hash(point)).is_ok();
-            let known = if may_be_known { self.known.get(&bits(point)).copied() } else { None };
-            match known.filter(|(number, _)| taken.insert(*number)) {
-                Some((number, at)) => {
-                    found.numbers.push(number);
-                    found.old.push((i, number, at));
-                }
-                None => {
-                    found.numbers.push((self.points + found.new.len()) as u32);
-                    found.new.push(i);
-                }
-            }
-        }
-        Ok(found)
-    }
-}
-
-fn without_values(field: &Field) -> Field {
-    let Field { name, unit, vector, time, integer, .. } = field;
-    Field {
-        name: name.clone(),
-        values: Vec::new(),
-        unit: unit.clone(),
-        vector: vector.clone(),
-        time: *time,
-        integer: *integer,
-    }
-}
-
-/// The fields of a piece in the order of those of the first one, which must be the same.
-fn in_order(first: &[Field], mut own: Vec<Field>) -> Result<Vec<Field>, ReadReason> {
-    let missing = |what: String| Err(ReadReason::Missing(what));
-    if let Some(extra) = own.iter().find(|field| !first.iter().any(|known| known.name == field.name)) {
-        return missing(format!("array \"{}\", which this piece has, in an earlier piece", extra.name));
-    }
-    let mut ordered = Vec::with_capacity(first.len());
-    for known in first {
-        let Some(at) = own.iter().position(|field| field.name == known.name) else {
-            return missing(format!("array \"{}\", which earlier pieces have,", known.name));
-        };
-        // Units and parts of vectors are those of the first piece.
-        let Field { values, integer, .. } = own.swap_remove(at);
-        ordered.push(Field { values, integer, ..without_values(known) });
-    }
-    Ok(ordered)
 }

@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 use crate::cells::Numbering;
 use crate::error::{At, ReadError, ReadReason};
 use crate::listed::for_each_file;
-use crate::vtu::{NumberPoints, PieceReader, first_number, join};
+use crate::vtu::{NumberPoints, first_number, join, readers};
 use crate::xml::Document;
 use crate::{Beside, ReadOptions};
 use tetralod::geom::bits_of;
@@ -39,9 +39,8 @@ pub(super) struct Whole {
 impl Whole {
     /// Appends the pieces in a file.
     fn append(&mut self, document: &Document<'_>, options: &ReadOptions) -> Result<(), ReadError> {
-        for (number, piece) in document.full_pieces() {
-            let reader = PieceReader { document, piece, number, options };
-            let place = || format!("piece {number}, <PointData>");
+        for reader in readers(document, options) {
+            let place = || format!("{}, <PointData>", reader.place());
             self.add(&mut |numbers| reader.read(numbers), &place)?;
         }
         Ok(())
@@ -58,7 +57,7 @@ impl Whole {
         let mut new = Vec::new();
         let mut part = read(&mut |points| {
             let numbers;
-            (numbers, new) = self.numbered(points, first)?;
+            (numbers, new) = numbered(points, first, |point| self.known.get(&bits(point)).copied())?;
             Ok(Numbering::Each(numbers))
         })?;
         keep(&mut part.positions, &new);
@@ -72,20 +71,25 @@ impl Whole {
         let is_first = !std::mem::replace(&mut self.has_pieces, true);
         join(&mut self.mesh, part, is_first).at(place)
     }
+}
 
-    /// The numbers of a piece's points, and which of them are new, from number `first` on.
-    fn numbered(&self, points: &[[f64; 3]], first: usize) -> Result<(Vec<u32>, Vec<usize>), ReadReason> {
-        first_number(first, points.len())?;
-        let (mut numbers, mut new, mut taken) = (Vec::new(), Vec::new(), HashSet::new());
-        for (index, point) in points.iter().enumerate() {
-            let known = self.known.get(&bits(*point)).copied().filter(|&number| taken.insert(number));
-            numbers.push(known.unwrap_or((first + new.len()) as u32));
-            if known.is_none() {
-                new.push(index);
-            }
+/// The numbers of a piece's points, and which of them are new, from number `first` on; `known` gives that of a place. Points of one piece
+/// stay different.
+pub(super) fn numbered(
+    points: &[[f64; 3]],
+    first: usize,
+    known: impl Fn([f64; 3]) -> Option<u32>,
+) -> Result<(Vec<u32>, Vec<usize>), ReadReason> {
+    first_number(first, points.len())?;
+    let (mut numbers, mut new, mut taken) = (Vec::new(), Vec::new(), HashSet::new());
+    for (index, &point) in points.iter().enumerate() {
+        let known = known(point).filter(|&number| taken.insert(number));
+        numbers.push(known.unwrap_or((first + new.len()) as u32));
+        if known.is_none() {
+            new.push(index);
         }
-        Ok((numbers, new))
     }
+    Ok((numbers, new))
 }
 
 /// The bits of a position.

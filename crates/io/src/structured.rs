@@ -4,7 +4,7 @@ use crate::contents::Survey;
 use crate::error::{At, ReadError, ReadReason};
 use crate::fields::component_of;
 use crate::grid::{Extent, MAX_GRID_POINTS, checked_dims, dims_in, mesh, most_tets, rectilinear};
-use crate::grid_parts::{InParts, expect_values, extent_of};
+use crate::grid_parts::{InParts, expect_values, extent_of, whole_extent};
 use crate::listed::for_each_file;
 use crate::vtu::{self, PieceReader};
 use crate::xml::Document;
@@ -21,11 +21,8 @@ pub(super) fn read(
     let (whole, dims) = whole(document).at(place)?;
     let mut grid = InParts::default();
     let time = for_each_file(document, beside, &options.memory, &mut |file| {
-        for (number, piece) in file.full_pieces() {
-            let reader = PieceReader { document: file, piece, number, options };
-            grid.add(&reader, whole, coordinates(&reader, whole)?)?;
-        }
-        Ok(())
+        vtu::readers(file, options)
+            .try_for_each(|reader| grid.add(&reader, whole, coordinates(&reader, whole)?))
     })?;
     // The first three are the coordinates.
     let mut values = grid.finish(whole).at(place)?;
@@ -56,10 +53,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The extent of the whole grid and its points along each axis, whose product does not overflow.
 fn whole(document: &Document<'_>) -> Result<(Extent, [u64; 3]), ReadReason> {
-    let whole: Extent = document
-        .dataset
-        .numbers("WholeExtent")?
-        .ok_or_else(|| ReadReason::Missing("attribute WholeExtent".into()))?;
+    let whole = whole_extent(document)?;
     let dims = dims_in(whole, whole)?;
     checked_dims(dims)?;
     Ok((whole, dims))

@@ -15,8 +15,7 @@ use tetralod::mesh::Field;
 /// # Errors
 /// As [`read_bytes`](super::read_bytes), as far as that follows from the structure of the file.
 pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
-    let unpacked =
-        packed::unpacked(bytes, &MemoryLimit::default()).at(String::new).map_err(|e| in_file(e, name))?;
+    let unpacked = packed::unpacked(bytes, &MemoryLimit::default()).in_file(name)?;
     let bytes = &*unpacked;
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
@@ -53,7 +52,7 @@ fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
 /// # Errors
 /// If the sidecar does not say what is needed.
 pub fn survey_raw(name: &str, sidecar: &[u8]) -> Result<Survey, ReadError> {
-    let sidecar = raw::Sidecar::parse(sidecar).at(String::new).map_err(|e| in_file(e, name))?;
+    let sidecar = raw::Sidecar::parse(sidecar).in_file(name)?;
     Ok(sidecar.survey())
 }
 

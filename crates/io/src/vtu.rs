@@ -13,12 +13,12 @@ use tetralod::mesh::{Field, MeshInput, TetMesh};
 /// Reads a document of type `UnstructuredGrid`. The points of different pieces stay different points.
 pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let mut mesh = TetMesh::default();
-    for (i, (number, piece)) in document.full_pieces().enumerate() {
+    for (i, reader) in readers(document, options).enumerate() {
         let first = mesh.positions.len();
-        let part = PieceReader { document, piece, number, options }.read(&mut |points| {
+        let part = reader.read(&mut |points| {
             Ok(Numbering::From { first: first_number(first, points.len())?, points: points.len() })
         })?;
-        join(&mut mesh, part, i == 0).at(|| format!("piece {number}, <PointData>"))?;
+        join(&mut mesh, part, i == 0).at(|| format!("{}, <PointData>", reader.place()))?;
     }
     Ok(mesh)
 }
@@ -33,10 +33,8 @@ pub(super) fn first_number(first: usize, points: usize) -> Result<u32, ReadReaso
 /// Says what a document of type `UnstructuredGrid` contains; of its arrays only the types of cells are decoded.
 pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
     let (mut points, mut cells) = (0_u64, 0_u64);
-    let options = &ReadOptions::default();
-    for (number, piece) in document.full_pieces() {
-        let reader = PieceReader { document, piece, number, options };
-        let count = piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
+    for reader in readers(document, &ReadOptions::default()) {
+        let count = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
         points = points.saturating_add(count as u64);
         cells = cells.saturating_add(reader.most_tets()?);
     }
@@ -46,9 +44,8 @@ pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
 
 /// The fields at points and at cells of the first piece, without values.
 pub(super) fn names(document: &Document<'_>) -> Result<[Vec<Field>; 2], ReadError> {
-    let Some((number, piece)) = document.full_pieces().next() else { return Ok([Vec::new(), Vec::new()]) };
     let options = &ReadOptions::default();
-    let reader = PieceReader { document, piece, number, options };
+    let Some(reader) = readers(document, options).next() else { return Ok([Vec::new(), Vec::new()]) };
     Ok([reader.field_names("PointData")?, reader.field_names("CellData")?])
 }
 
@@ -58,6 +55,14 @@ pub(super) struct PieceReader<'a, 'd> {
     pub piece: &'a Piece<'d>,
     pub number: usize,
     pub options: &'a ReadOptions,
+}
+
+/// Readers of the pieces of a document that are not empty.
+pub(super) fn readers<'a, 'd>(
+    document: &'a Document<'d>,
+    options: &'a ReadOptions,
+) -> impl Iterator<Item = PieceReader<'a, 'd>> {
+    document.full_pieces().map(move |(number, piece)| PieceReader { document, piece, number, options })
 }
 
 /// Numbers the points of a piece, given their positions.
@@ -253,27 +258,37 @@ pub(super) fn join(mesh: &mut TetMesh, part: TetMesh, is_first: bool) -> Result<
         *mesh = part;
         return Ok(());
     }
-    join_fields(&mut mesh.fields, &part.fields)?;
-    join_fields(&mut mesh.cell_fields, &part.cell_fields)?;
+    join_fields(&mut mesh.fields, part.fields)?;
+    join_fields(&mut mesh.cell_fields, part.cell_fields)?;
     mesh.input.append(part.input);
     mesh.positions.extend(part.positions);
     mesh.tets.extend(part.tets);
     Ok(())
 }
 
-fn join_fields(fields: &mut [Field], more: &[Field]) -> Result<(), ReadReason> {
-    if let Some(extra) = more.iter().find(|f| !fields.iter().any(|g| g.name == f.name)) {
-        return Err(ReadReason::Missing(format!(
-            "array \"{}\", which this piece has, in an earlier piece",
-            extra.name
-        )));
-    }
-    for Field { name, values, integer, .. } in fields {
-        let same = more.iter().find(|f| f.name == *name);
-        let same =
-            same.ok_or_else(|| ReadReason::Missing(format!("array \"{name}\", which earlier pieces have,")))?;
-        values.extend_from_slice(&same.values);
-        *integer &= same.integer;
+fn join_fields(fields: &mut [Field], more: Vec<Field>) -> Result<(), ReadReason> {
+    let more = in_order(fields, more)?;
+    for (field, Field { values, integer, .. }) in fields.iter_mut().zip(more) {
+        field.values.extend(values);
+        field.integer &= integer;
     }
     Ok(())
+}
+
+/// The fields of a piece in the order of those of the first one, which must be the same.
+pub(super) fn in_order(first: &[Field], mut own: Vec<Field>) -> Result<Vec<Field>, ReadReason> {
+    let missing = |what: String| Err(ReadReason::Missing(what));
+    if let Some(extra) = own.iter().find(|field| !first.iter().any(|known| known.name == field.name)) {
+        return missing(format!("array \"{}\", which this piece has, in an earlier piece", extra.name));
+    }
+    let mut ordered = Vec::with_capacity(first.len());
+    for known in first {
+        let Some(at) = own.iter().position(|field| field.name == known.name) else {
+            return missing(format!("array \"{}\", which earlier pieces have,", known.name));
+        };
+        // Units and parts of vectors are those of the first piece.
+        let Field { values, integer, .. } = own.swap_remove(at);
+        ordered.push(Field { values, integer, ..known.without_values() });
+    }
+    Ok(ordered)
 }

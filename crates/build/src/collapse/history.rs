@@ -212,12 +212,7 @@ impl Replay<'_> {
             .map_err(|_| BuildError::Internal(UpdateError::Vertex { update: 0, vertex: 0 }))?;
         let mut numbers = Numbers::new(number);
         for (done, &i) in order.iter().enumerate() {
-            if done % 4096 == 0 {
-                let (done, total) = (done as u64, self.history.len() as u64);
-                if progress(BuildProgress { stage: "order", done, total, tetrahedra: None }).is_break() {
-                    return Err(BuildError::Stopped);
-                }
-            }
+            BuildProgress::tell_ordered(done, self.history.len(), progress)?;
             let appended = self.append(&mut builder, &mut numbers, i as usize, found.as_deref_mut());
             appended.map_err(BuildError::Internal)?;
         }

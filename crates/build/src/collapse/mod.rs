@@ -58,16 +58,7 @@ pub fn edge_mt(
     let Builder { mesh: base, data, history, .. } = builder;
     let depth = data.height.iter().copied().max().unwrap_or(0);
     let (mt, vertices) = history::edge_mt(info, &base, &data, &history, config.block_bits, progress)?;
-    let summary = BuildSummary {
-        vertices: mt.info().vertices,
-        tetrahedra: mt.info().tetrahedra,
-        base_vertices: mt.base().positions.len() as u32,
-        base_tetrahedra: mt.base().tets.len() as u32,
-        updates: mt.updates(),
-        position_bits: mt.info().lattice.bits,
-        depth,
-        interface_deviation: 0.0,
-    };
+    let summary = BuildSummary::of(mt.info(), mt.base(), depth);
     let exact = field_selection::exact_values(mesh, config, &vertices)?;
     Ok(BuildResult { mt, summary, vertices, exact })
 }
@@ -138,9 +129,7 @@ impl<'a> Builder<'a> {
                 let done = self.history.len() as u64;
                 let total = u64::from(self.reference.points);
                 let tetrahedra = Some(self.mesh.live());
-                if progress(BuildProgress { stage: "collapse", done, total, tetrahedra }).is_break() {
-                    return Err(BuildError::Stopped);
-                }
+                BuildProgress { stage: "collapse", done, total, tetrahedra }.tell(progress)?;
             }
             let Some(key) = self.queue.pop() else {
                 if self.next_level() {

@@ -14,6 +14,7 @@ use crate::order::base::{Numbered, number_base};
 use crate::order::block_order;
 use crate::{BuildError, BuildProgress, BuildSummary, OnProgress};
 use std::cmp::Reverse;
+use tetralod::geom::Groups;
 use tetralod::mesh::NONE;
 use tetralod::mt::{ErrorCode, HalfEdgeMt, MtInfo, VertexId};
 
@@ -173,11 +174,6 @@ impl Collapses {
         self.errors_of_maker(self.earlier + collapse)
     }
 
-    /// The collapses that made the star of another one: the updates that depend on its inverse.
-    fn makers_of(&self, collapse: u32) -> &[u32] {
-        &self.makers[self.starts[collapse as usize]..self.starts[collapse as usize + 1]]
-    }
-
     /// Adds the errors of a collapse whose star is recorded from `first` on.
     fn add_errors(
         &mut self,
@@ -245,16 +241,7 @@ impl Collapses {
         let (order, depth) = self.order((base, |v| numbered.number[v as usize]), block_bits, None);
         // For the order alone.
         (self.boxes, self.also_near) = (Vec::new(), Vec::new());
-        let summary = BuildSummary {
-            vertices: info.vertices,
-            tetrahedra: info.tetrahedra,
-            base_vertices: numbered.mesh.positions.len() as u32,
-            base_tetrahedra: numbered.mesh.tets.len() as u32,
-            updates: info.updates,
-            position_bits: info.lattice.bits,
-            depth,
-            interface_deviation: 0.0,
-        };
+        let summary = BuildSummary::of(&info, &numbered.mesh, depth);
         let (mt, vertices) = self.append_all(info, numbered, &order, (quantized, block_bits), progress)?;
         Ok((mt, vertices, summary))
     }
@@ -273,7 +260,7 @@ impl Collapses {
         falling.sort_by_key(|&c| Reverse(self.errors_of(c).iter().max()));
         let mut places = vec![0; count];
         (0..).zip(&falling).for_each(|(place, &c)| places[c as usize] = place);
-        let (starts, parents) = self.parents(&falling, &places);
+        let parents = self.parents(&falling, &places);
         let mut removed_by = vec![NONE; self.vertices.iter().max().map_or(0, |&v| v as usize + 1)];
         (0..).zip(&self.vertices).for_each(|(c, &v): (u32, _)| removed_by[v as usize] = c);
         let label = |v: u32| match removed_by.get(v as usize) {
@@ -291,15 +278,14 @@ impl Collapses {
         let largest = |&c: &u32| self.errors_of(c).iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         let errors: Vec<ErrorCode> = falling.iter().map(largest).collect();
         let mut depths: Vec<u32> = Vec::with_capacity(count);
-        for rows in starts.windows(2) {
-            let above = parents[rows[0] as usize..rows[1] as usize].iter().map(|&p| depths[p as usize]).max();
+        for u in 0..count {
+            let above = parents.of(u).iter().map(|&p| depths[p as usize]).max();
             depths.push(above.unwrap_or(0) + 1);
         }
         let depth = depths.into_iter().max().unwrap_or(0);
         let updates = block_order::Updates {
             base,
             near: &near,
-            starts: &starts,
             parents: &parents,
             boxes: &boxes,
             errors: &errors,
@@ -310,29 +296,18 @@ impl Collapses {
     }
 
     /// The parents of each update, ascending, where the collapses are numbered anew: `falling` has them in the order of their `places`.
-    fn parents(&self, falling: &[u32], places: &[u32]) -> (Vec<u32>, Vec<u32>) {
-        let mut distinct: Vec<u32> = Vec::new();
-        let mut each = |see: &mut dyn FnMut(u32, u32)| {
+    fn parents(&self, falling: &[u32], places: &[u32]) -> Groups {
+        Groups::new(falling.len(), |add| {
+            let mut distinct: Vec<u32> = Vec::new();
             for (parent, &c) in (0..).zip(falling) {
                 distinct.clear();
-                let makers = self.makers_of(c).iter().filter(|&&maker| maker != NONE);
+                let makers = self.get(c).star.0.iter().filter(|&&maker| maker != NONE);
                 distinct.extend(makers.filter_map(|maker| maker.checked_sub(self.earlier)));
                 distinct.sort_unstable();
                 distinct.dedup();
-                distinct.iter().for_each(|&child| see(parent, places[child as usize]));
+                distinct.iter().for_each(|&child| add(places[child as usize] as usize, parent));
             }
-        };
-        let mut starts = vec![0_u32; falling.len() + 1];
-        each(&mut |_, child| starts[child as usize + 1] += 1);
-        (0..falling.len()).for_each(|u| starts[u + 1] += starts[u]);
-        let mut next = starts.clone();
-        let mut parents = vec![0; starts.last().map_or(0, |&all| all as usize)];
-        each(&mut |parent, child| {
-            let place = &mut next[child as usize];
-            parents[*place as usize] = parent;
-            *place += 1;
-        });
-        (starts, parents)
+        })
     }
 
     /// The MT whose updates undo the collapses in this order.
@@ -357,7 +332,7 @@ impl Collapses {
         let reference = (&quantized.positions[..], &quantized.levels[..]);
         let mut appender = Appender::new(info, numbered, &updates, reference, block_bits)?;
         for (u, &c) in order.iter().enumerate() {
-            report(u, order.len(), progress)?;
+            BuildProgress::tell_ordered(u, order.len(), progress)?;
             let Collapse { vertex, errors, star: (makers, inner), .. } = self.get(c);
             appender.push(
                 vertex,
@@ -367,10 +342,4 @@ impl Collapses {
         }
         appender.finish()
     }
-}
-
-/// Reports now and then how many of all updates have been appended.
-pub(crate) fn report(done: usize, total: usize, progress: OnProgress<'_>) -> Result<(), BuildError> {
-    let at = BuildProgress { stage: "order", done: done as u64, total: total as u64, tetrahedra: None };
-    if done.is_multiple_of(4096) && progress(at).is_break() { Err(BuildError::Stopped) } else { Ok(()) }
 }

@@ -224,9 +224,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
             let done = self.record.len() as u64;
             let total = u64::from(self.state.reference.points);
             let tetrahedra = Some(self.state.mesh.live());
-            if progress(BuildProgress { stage: "remove", done, total, tetrahedra }).is_break() {
-                return Err(BuildError::Stopped);
-            }
+            BuildProgress { stage: "remove", done, total, tetrahedra }.tell(progress)?;
             self.remove_before(batch[0].guess, &mut ready);
             self.look_at(batch, &mut ready);
         }

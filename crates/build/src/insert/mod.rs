@@ -273,9 +273,7 @@ impl<'a> Greedy<'a> {
         for done in 0..count {
             if done % PROGRESS_STEPS == 0 {
                 let (done, total, tetrahedra) = (done as u64, count as u64, Some(self.live as u32));
-                if progress(BuildProgress { stage: "insert", done, total, tetrahedra }).is_break() {
-                    return Err(BuildError::Stopped);
-                }
+                BuildProgress { stage: "insert", done, total, tetrahedra }.tell(progress)?;
             }
             let slot = self.pop();
             self.insert_worst(slot)?;

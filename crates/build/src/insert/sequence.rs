@@ -106,12 +106,7 @@ impl Sequence {
         // The number that each tetrahedron of the sequence has in the MT.
         let mut ids = vec![NONE; self.tets.len()];
         for (done, &i) in order.iter().enumerate() {
-            if done % 4096 == 0 {
-                let (done, total) = (done as u64, order.len() as u64);
-                if progress(BuildProgress { stage: "order", done, total, tetrahedra: None }).is_break() {
-                    return Err(BuildError::Stopped);
-                }
-            }
+            BuildProgress::tell_ordered(done, order.len(), progress)?;
             let Insertion { vertex, inserted, .. } = &self.steps[i as usize];
             number[*vertex as usize] = (mt.base().positions.len() + done) as u32;
             let sources = &arcs.source[self.steps[i as usize].removed.clone()];

@@ -25,18 +25,13 @@ pub(crate) fn locations(
     positions: &[[i32; 3]],
     places: &Places,
 ) -> Result<Vec<Location>, MeshError> {
-    let points = 0..positions.len() as u32;
     if !places.any_moved() {
         return Ok(Vec::new());
     }
-    let neighbors = tetralod::mesh::neighbors(tets)?;
-    let mut first = vec![NONE; positions.len()];
-    for (t, tet) in (0..).zip(tets) {
-        tet.iter().for_each(|&v| first[v as usize] = t);
-    }
-    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Found::default() };
-    let moved = points.filter(|&point| places.is_moved(point) && first[point as usize] != NONE);
-    Ok(moved.map(|point| search.locate(point, first[point as usize])).collect())
+    let mut search = Search::new(tets, positions, places)?;
+    let points = (0..positions.len() as u32).filter(|&point| places.is_moved(point));
+    let moved: Vec<u32> = points.filter(|&point| search.first[point as usize] != NONE).collect();
+    Ok(moved.into_iter().map(|point| search.locate(point)).collect())
 }
 
 /// The locations of these points.
@@ -46,13 +41,8 @@ pub(crate) fn locations_of(
     places: &Places,
     points: impl Iterator<Item = u32>,
 ) -> Result<Vec<Location>, MeshError> {
-    let neighbors = tetralod::mesh::neighbors(tets)?;
-    let mut first = vec![NONE; positions.len()];
-    for (t, tet) in (0..).zip(tets) {
-        tet.iter().for_each(|&v| first[v as usize] = t);
-    }
-    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Found::default() };
-    Ok(points.map(|point| search.locate(point, first[point as usize])).collect())
+    let mut search = Search::new(tets, positions, places)?;
+    Ok(points.map(|point| search.locate(point)).collect())
 }
 
 /// The locations of points in a piece of a mesh: those that the piece alone tells, and the other points that the lattice moved. Those of
@@ -66,20 +56,15 @@ pub(crate) fn locations_in_piece(
     if tets.is_empty() || !places.any_moved() {
         return Ok((Vec::new(), Vec::new()));
     }
-    let neighbors = tetralod::mesh::neighbors(tets)?;
+    let mut search = Search::new(tets, positions, places)?;
     // Behind these faces there may be more.
-    let is_open = |t: u32| {
+    let is_open = |neighbors: &[[u32; 4]], t: u32| {
         (0..4).any(|i| {
             let across = neighbors[t as usize][i];
             let face = (0..4).filter(|&k| k != i).map(|k| tets[t as usize][k]);
             across == NONE && face.into_iter().all(|v| is_shared[v as usize])
         })
     };
-    let mut first = vec![NONE; positions.len()];
-    for (t, tet) in (0..).zip(tets) {
-        tet.iter().for_each(|&v| first[v as usize] = t);
-    }
-    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Found::default() };
     let (mut located, mut beyond) = (Vec::new(), Vec::new());
     for point in (0..positions.len() as u32).filter(|&point| places.is_moved(point)) {
         // What only other pieces use is theirs.
@@ -87,9 +72,9 @@ pub(crate) fn locations_in_piece(
             beyond.push(point);
             continue;
         }
-        let location = search.locate(point, first[point as usize]);
+        let location = search.locate(point);
         // The search may go on behind each tetrahedron that it has found.
-        if search.found.cells.iter().any(|&t| is_open(t)) {
+        if search.found.cells.iter().any(|&t| is_open(&search.neighbors, t)) {
             beyond.push(point);
         } else {
             located.push(location);
@@ -100,7 +85,9 @@ pub(crate) fn locations_in_piece(
 
 struct Search<'a> {
     tets: &'a [[u32; 4]],
-    neighbors: &'a [[u32; 4]],
+    neighbors: Vec<[u32; 4]>,
+    /// For each point the last one of the cells that have it as a corner; [`NONE`] without any.
+    first: Vec<u32>,
     positions: &'a [[i32; 3]],
     places: &'a Places,
     found: Found,
@@ -141,9 +128,19 @@ impl Found {
     }
 }
 
-impl Search<'_> {
-    /// Searches the cells whose bounding boxes touch that of the point before and after rounding, starting at `first`.
-    fn locate(&mut self, point: u32, first: u32) -> Location {
+impl<'a> Search<'a> {
+    fn new(tets: &'a [[u32; 4]], positions: &'a [[i32; 3]], places: &'a Places) -> Result<Self, MeshError> {
+        let neighbors = tetralod::mesh::neighbors(tets)?;
+        let mut first = vec![NONE; positions.len()];
+        for (t, tet) in (0..).zip(tets) {
+            tet.iter().for_each(|&v| first[v as usize] = t);
+        }
+        Ok(Self { tets, neighbors, first, positions, places, found: Found::default() })
+    }
+
+    /// Searches the cells whose bounding boxes touch that of the point before and after rounding, starting at one that has it.
+    fn locate(&mut self, point: u32) -> Location {
+        let first = self.first[point as usize];
         let (place, rounded) = (self.places.at(point), as_vec(self.positions[point as usize]));
         let (low, high) = (place.min(rounded), place.max(rounded));
         self.found.start(first);

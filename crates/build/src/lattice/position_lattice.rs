@@ -21,11 +21,6 @@ pub(crate) fn is_ordinary(origin: f64, step: f64, bits: u32) -> bool {
     step >= smallest && origin.abs() <= largest && end.abs() <= largest
 }
 
-/// Refuses points on which no lattice would do, before cells are said to be too thin for one.
-pub(crate) fn check_points(mesh: &TetMesh) -> Result<(), BuildError> {
-    if mesh.positions.is_empty() { Ok(()) } else { check_scale(&lattice(mesh, FEWEST_BITS)) }
-}
-
 /// Refuses lattices that double precision cannot compute with.
 pub(crate) fn check_scale(lattice: &Lattice) -> Result<(), BuildError> {
     let is_ordinary = |k: usize| is_ordinary(lattice.origin[k], lattice.step[k], lattice.bits);
@@ -47,6 +42,10 @@ pub(crate) struct Placed {
 /// - if neither is configured, the coarsest one of at least [`FEWEST_BITS`], with [`SPARE_BITS`] more where it had to
 ///   be finer.
 pub(crate) fn place(mesh: &TetMesh, config: &BuildConfig) -> Result<Placed, BuildError> {
+    // Before cells are said to be too thin for a lattice.
+    if !mesh.positions.is_empty() {
+        check_scale(&lattice(mesh, FEWEST_BITS))?;
+    }
     match (config.position_bits, config.position_tolerance) {
         (Some(_), Some(_)) => {
             Err(BuildError::Option { name: "position-tolerance", expected: "given without position-bits" })
@@ -151,11 +150,16 @@ fn fits(mesh: &TetMesh, placed: &Placed) -> bool {
 
 /// The first cell that is not positive.
 fn flat_cell(mesh: &TetMesh, placed: &Placed) -> Option<u32> {
+    first_flat(&mesh.tets, &placed.positions)
+}
+
+/// The first tetrahedron that is not positive.
+pub(crate) fn first_flat(tets: &[[u32; 4]], positions: &[[i32; 3]]) -> Option<u32> {
     let flat = |tet: &[u32; 4]| {
-        let [a, b, c, d] = tet.map(|v| placed.positions[v as usize]);
+        let [a, b, c, d] = tet.map(|v| positions[v as usize]);
         orient3d(a, b, c, d) <= 0
     };
-    mesh.tets.iter().position(flat).map(|cell| cell as u32)
+    tets.iter().position(flat).map(|tet| tet as u32)
 }
 
 /// The lattice that [`place`] puts the points of a grid on, if it holds each of them exactly.

@@ -185,7 +185,6 @@ pub(crate) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     }
     let chosen = field_selection::fields(mesh, config)?;
     check_finite(mesh, &chosen)?;
-    position_lattice::check_points(mesh)?;
     let placed = position_lattice::place(mesh, config)?;
     position_lattice::check_scale(&placed.lattice)?;
     let fields = field_lattice::field_lattices(&chosen, config)?;

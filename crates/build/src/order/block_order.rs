@@ -21,6 +21,7 @@
 //! sorted by their near vertices, as far as this allows.
 
 use std::collections::BTreeSet;
+use tetralod::geom::Groups;
 use tetralod::mt::ErrorCode;
 use tetralod::threads;
 
@@ -30,9 +31,8 @@ pub(crate) struct Updates<'a> {
     pub base: u32,
     /// The near vertex of each update, in the numbers of that order.
     pub near: &'a [u32],
-    /// Where the parents of each update begin; one more than there are updates.
-    pub starts: &'a [u32],
-    pub parents: &'a [u32],
+    /// The parents of each update.
+    pub parents: &'a Groups,
     /// The box around what each update touches: its lowest and its highest corner.
     pub boxes: &'a [[[i32; 3]; 2]],
     /// The largest error of each. It does not grow along the partial order.
@@ -62,7 +62,7 @@ impl Updates<'_> {
     }
 
     fn parents(&self, u: u32) -> &[u32] {
-        &self.parents[self.starts[u as usize] as usize..self.starts[u as usize + 1] as usize]
+        self.parents.of(u as usize)
     }
 
     /// The updates in the new order, in blocks of `2^block_bits`.
@@ -90,9 +90,9 @@ impl Updates<'_> {
     /// Sorts the updates of each block by their near vertices, as far as the partial order allows: which update is
     /// whose child takes few bits then.
     fn sort_blocks(&self, order: &mut [u32], block_bits: u32) {
-        let mut children: Vec<Vec<u32>> = vec![Vec::new(); self.count()];
-        (0..self.count() as u32)
-            .for_each(|u| self.parents(u).iter().for_each(|&p| children[p as usize].push(u)));
+        let children = Groups::new(self.count(), |add| {
+            (0..self.count() as u32).for_each(|u| self.parents(u).iter().for_each(|&p| add(p as usize, u)));
+        });
         let mut new_numbers = vec![u32::MAX; self.count()];
         let mut block_of = vec![0_u32; self.count()];
         (0..).zip(order.iter()).for_each(|(at, &u): (u32, _)| block_of[u as usize] = at >> block_bits);
@@ -118,7 +118,8 @@ impl Updates<'_> {
                 *place = u;
                 new_numbers[u as usize] = number;
                 number += 1;
-                for &child in children[u as usize].iter().filter(|&&child| block_of[child as usize] == own) {
+                for &child in children.of(u as usize).iter().filter(|&&child| block_of[child as usize] == own)
+                {
                     left[child as usize] -= 1;
                     if left[child as usize] == 0 {
                         ready.insert((near(child, &new_numbers), child));
@@ -285,8 +286,8 @@ mod tests {
     fn the_order_extends_the_partial_order_and_keeps_together_what_is_near() {
         let levels = 12;
         let count = (1_u32 << levels) - 1;
-        let parents: Vec<u32> = (1..count).map(|u| (u - 1) / 2).collect();
-        let starts: Vec<u32> = [0].into_iter().chain(0..count).collect();
+        let parents =
+            Groups::new(count as usize, |add| (1..count).for_each(|u| add(u as usize, (u - 1) / 2)));
         let depth = |u: u32| (u + 1).ilog2();
         let boxes: Vec<[[i32; 3]; 2]> = (0..count)
             .map(|u| {
@@ -298,15 +299,8 @@ mod tests {
         let errors: Vec<ErrorCode> =
             (0..count).map(|u| ErrorCode::at_least(0.5_f64.powi(depth(u) as i32))).collect();
         let near: Vec<u32> = (0..count).map(|u| if u == 0 { 0 } else { 1 + (u - 1) / 2 }).collect();
-        let updates = Updates {
-            base: 1,
-            near: &near,
-            starts: &starts,
-            parents: &parents,
-            boxes: &boxes,
-            errors: &errors,
-            domain: None,
-        };
+        let updates =
+            Updates { base: 1, near: &near, parents: &parents, boxes: &boxes, errors: &errors, domain: None };
         let order = updates.order(4);
         let mut numbers = vec![u32::MAX; count as usize];
         for (number, &u) in (0..).zip(&order) {
@@ -335,16 +329,15 @@ mod tests {
             Some(above) => vec![above],
             None => Vec::new(),
         };
-        let parents: Vec<u32> = (0..count).flat_map(parents_of).collect();
-        let mut starts = vec![0];
-        (0..count).for_each(|u| starts.push(starts[u as usize] + parents_of(u).len() as u32));
+        let parents = Groups::new(count as usize, |add| {
+            (0..count).for_each(|u| parents_of(u).into_iter().for_each(|p| add(u as usize, p)));
+        });
         let touched = |u: u32| [u % width, u / width].map(|x| x as i32);
         let boxes: Vec<[[i32; 3]; 2]> =
             (0..count).map(touched).map(|[at, by]| [[at - by, 0, 0], [at + by + 1, 1, 1]]).collect();
         let updates = Updates {
             base: 1,
             near: &vec![0; count as usize],
-            starts: &starts,
             parents: &parents,
             boxes: &boxes,
             errors: &vec![ErrorCode::at_least(0.1); count as usize],

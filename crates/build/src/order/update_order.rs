@@ -6,7 +6,7 @@
 //! so on, the vertices that they split ascending: that takes few bits.
 
 use std::collections::BTreeMap;
-use tetralod::geom::morton;
+use tetralod::geom::{Groups, morton};
 
 /// What the order depends on. Updates are numbered by falling error, which extends the partial order.
 pub(crate) struct Updates<'a> {
@@ -111,22 +111,10 @@ impl Updates<'_> {
     /// Bands that end there, in each cell by cell what can come, again and again until all has.
     fn by_place(&self, ends: &[usize]) -> Vec<u32> {
         let count = self.vertices.len();
-        let mut children = vec![0_u32; count + 1];
-        self.parents.iter().for_each(|&p| children[p as usize + 1] += 1);
-        (0..count).for_each(|u| children[u + 1] += children[u]);
-        let child_starts = children.clone();
-        let mut all_children = vec![0_u32; self.parents.len()];
-        let mut left: Vec<u32> = Vec::with_capacity(count);
-        for u in 0..count as u32 {
-            let parents = self.parents(u);
-            left.push(parents.len() as u32);
-            for &p in parents {
-                all_children[children[p as usize] as usize] = u;
-                children[p as usize] += 1;
-            }
-        }
-        let children =
-            |u: u32| &all_children[child_starts[u as usize] as usize..child_starts[u as usize + 1] as usize];
+        let mut left: Vec<u32> = (0..count as u32).map(|u| self.parents(u).len() as u32).collect();
+        let children = Groups::new(count, |add| {
+            (0..count as u32).for_each(|u| self.parents(u).iter().for_each(|&p| add(p as usize, u)));
+        });
         let mut order = Vec::with_capacity(count);
         let mut start = 0;
         for &end in ends {
@@ -147,7 +135,7 @@ impl Updates<'_> {
                 for c in 0..cells {
                     while let Some(u) = ready[c].pop_first() {
                         order.push(u);
-                        for &child in children(u) {
+                        for &child in children.of(u as usize) {
                             left[child as usize] -= 1;
                             if left[child as usize] == 0 && (child as usize) < end {
                                 ready[cell(child)].insert(child);

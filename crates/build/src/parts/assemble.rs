@@ -7,9 +7,8 @@ use super::PartsError;
 use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::decimate::append::{Appender, Ordered};
-use crate::decimate::collapses::report;
 use crate::order::base::{Numbered, number_base};
-use crate::{BuildResult, BuildSummary, OnProgress};
+use crate::{BuildProgress, BuildResult, BuildSummary, OnProgress};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use tetralod::geom::lattice_box;
@@ -42,7 +41,7 @@ pub fn assemble(
     let level = |(&value, field): (&f64, &FieldInfo)| field.nearest(value);
     let levels: Vec<i32> = piece.values.iter().zip(info.fields.iter().cycle()).map(level).collect();
     let numbered = number_base(&piece.positions, &levels, info.fields.len(), &piece.tets);
-    let base = [numbered.mesh.positions.len() as u32, numbered.mesh.tets.len() as u32];
+    let summary = BuildSummary::of(&info, &numbered.mesh, 0);
     listed.check(&numbered)?;
     let mut base_marks = Vec::with_capacity(piece.tets.len());
     for (&maker, &inner) in piece.makers.iter().zip(&piece.inner) {
@@ -62,17 +61,8 @@ pub fn assemble(
     assembly.append_all(&plan, updates, progress)?;
     let depth = assembly.depths.into_iter().max().unwrap_or(0);
     let (mt, vertices) = assembly.appender.finish()?;
-    let summary = BuildSummary {
-        vertices: info.vertices,
-        tetrahedra: info.tetrahedra,
-        base_vertices: base[0],
-        base_tetrahedra: base[1],
-        updates: info.updates,
-        position_bits: info.lattice.bits,
-        depth,
-        interface_deviation: 0.0,
-    };
     let exact = exact(&plan, &values, &vertices);
+    let summary = BuildSummary { depth, ..summary };
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
 
@@ -233,7 +223,7 @@ impl Assembly<'_> {
         let own = numbers.span(node)?;
         let mut star = 0;
         for (i, errors) in rows.errors.chunks(*fields).enumerate() {
-            report(*done, depths.len(), progress)?;
+            BuildProgress::tell_ordered(*done, depths.len(), progress)?;
             let inserted: Range<usize> = star..star + usize::from(rows.stars[i]);
             let removers = rows.removers[inserted.clone()].iter().map(|&code| remover(code, own, &earlier));
             for below in removers.clone().filter(|&remover| remover != NONE) {

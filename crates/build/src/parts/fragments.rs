@@ -1,7 +1,7 @@
 //! What each piece of a mesh has of each part, and the parts that are made of it.
 
 use super::PartsError;
-use super::piece::{Made, Piece};
+use super::piece::Piece;
 use super::prepared::{Prepared, Stored, Whole};
 use crate::BuildError;
 use crate::lattice::location;
@@ -28,6 +28,80 @@ pub(super) struct Fragment {
     outside: Vec<u32>,
 }
 
+/// A mesh or a piece of one, and the parts of its tetrahedra.
+pub(super) struct InParts<'a> {
+    pub tets: &'a [[u32; 4]],
+    pub quantized: &'a Quantized,
+    /// Field by field.
+    pub values: Vec<&'a [f64]>,
+    pub part_of: &'a [u16],
+    /// For each point the first and the last part that has it, and the square of the shortest edge there.
+    pub ends: &'a [[u16; 2]],
+    pub shortest: &'a [f64],
+    /// The number of each tetrahedron in its part; nothing is there if no point was located.
+    pub ranks: &'a [u32],
+}
+
+impl InParts<'_> {
+    /// Passes on what each part has of it. `number` gives the number of a point in the whole.
+    pub fn each(
+        &self,
+        number: impl Fn(u32) -> u32,
+        put: &mut dyn FnMut(u16, Fragment) -> Result<(), PartsError>,
+    ) -> Result<(), PartsError> {
+        let &Self { tets, quantized, part_of, ends, shortest, ranks, .. } = self;
+        let part = |t: u32| part_of[t as usize];
+        let mut order: Vec<u32> = (0..tets.len() as u32).collect();
+        order.sort_unstable_by_key(|&t| (part(t), t));
+        let mut located: Vec<(u16, u32)> =
+            quantized.locations.iter().map(|at| part(at.tet)).zip(0..).collect();
+        located.sort_unstable();
+        let mut own = vec![NONE; ends.len()];
+        for group in order.chunk_by(|&a, &b| part(a) == part(b)) {
+            let part = part(group[0]);
+            let from = located.partition_point(|(other, _)| *other < part);
+            let here: Vec<_> = located[from..]
+                .iter()
+                .take_while(|(other, _)| *other == part)
+                .map(|(_, i)| quantized.locations[*i as usize])
+                .collect();
+            let mut taken: Vec<u32> = group.iter().flat_map(|t| tets[*t as usize]).collect();
+            taken.extend(here.iter().map(|at| at.point));
+            taken.sort_unstable_by_key(|&v| number(v));
+            taken.dedup();
+            (0..).zip(&taken).for_each(|(i, &v)| own[v as usize] = i);
+            let of = |v: u32| own[v as usize];
+            let values = taken.iter().flat_map(|&v| self.values.iter().map(move |all| all[v as usize]));
+            let fragment = Fragment {
+                points: taken.iter().map(|&v| number(v)).collect(),
+                positions: taken.iter().map(|&v| quantized.positions[v as usize]).collect(),
+                values: values.collect(),
+                shortest: taken.iter().map(|&v| shortest[v as usize]).collect(),
+                ends: taken.iter().map(|&v| ends[v as usize]).collect(),
+                moved: taken
+                    .iter()
+                    .filter(|&&v| quantized.is_moved(v))
+                    .map(|&v| (of(v), quantized.places.at(v).to_array()))
+                    .collect(),
+                tets: group.iter().map(|t| tets[*t as usize].map(of)).collect(),
+                inside: here.iter().map(|at| (of(at.point), ranks[at.tet as usize])).collect(),
+                outside: here.iter().filter(|at| at.outside).map(|at| of(at.point)).collect(),
+            };
+            put(part, fragment)?;
+        }
+        Ok(())
+    }
+}
+
+/// The number of each tetrahedron in its part, of which there are so many already.
+pub(super) fn ranks(part_of: &[u16], counts: &mut [u32]) -> Vec<u32> {
+    let rank = |&part: &u16| {
+        counts[usize::from(part)] += 1;
+        counts[usize::from(part)] - 1
+    };
+    part_of.iter().map(rank).collect()
+}
+
 /// A piece, and the parts of its tetrahedra.
 pub(super) struct PieceParts {
     pub prepared: Prepared,
@@ -42,13 +116,13 @@ impl PieceParts {
         let part_of = whole.parts_of(&stored.positions, &stored.tets);
         let ends = ends(stored.points.len(), &stored.tets, &part_of);
         let prepared = Prepared::of(whole, stored)?;
-        let shortest = prepared.shortest();
+        let shortest = prepared.quantized.shortest_edges(&prepared.mesh.tets);
         Ok(Self { prepared, part_of, ends, shortest })
     }
 }
 
 /// For each point the first and the last part of the tetrahedra there.
-fn ends(points: usize, tets: &[[u32; 4]], part_of: &[u16]) -> Vec<[u16; 2]> {
+pub(super) fn ends(points: usize, tets: &[[u32; 4]], part_of: &[u16]) -> Vec<[u16; 2]> {
     let mut ends = vec![[u16::MAX, 0]; points];
     for (tet, &part) in tets.iter().zip(part_of) {
         for &v in tet {
@@ -197,55 +271,15 @@ impl Fragments {
     ) -> Result<(), PartsError> {
         let PieceParts { prepared: Prepared { points, mesh, quantized, .. }, part_of, ends, shortest } =
             piece;
-        let mut rank = |&part: &u16| {
-            let count = &mut self.counts[usize::from(part)];
-            *count += 1;
-            *count - 1
-        };
-        let ranks: Vec<u32> = part_of.iter().map(&mut rank).collect();
-        band.note(self.all, part_of, &ranks);
+        let ranks = &ranks(part_of, &mut self.counts);
+        band.note(self.all, part_of, ranks);
         self.all += part_of.len() as u32;
-        let mut tets: Vec<(u16, u32)> = part_of.iter().copied().zip(0..).collect();
-        tets.sort_unstable();
-        let mut located: Vec<(u16, u32)> =
-            quantized.locations.iter().map(|at| part_of[at.tet as usize]).zip(0..).collect();
-        located.sort_unstable();
-        let mut own = vec![NONE; points.len()];
-        for group in tets.chunk_by(|a, b| a.0 == b.0) {
-            let part = group[0].0;
-            let from = located.partition_point(|(other, _)| *other < part);
-            let here: Vec<_> = located[from..]
-                .iter()
-                .take_while(|(other, _)| *other == part)
-                .map(|(_, i)| quantized.locations[*i as usize])
-                .collect();
-            let mut taken: Vec<u32> = group.iter().flat_map(|(_, t)| mesh.tets[*t as usize]).collect();
-            taken.extend(here.iter().map(|at| at.point));
-            taken.sort_unstable_by_key(|&v| points[v as usize]);
-            taken.dedup();
-            (0..).zip(&taken).for_each(|(i, &v)| own[v as usize] = i);
-            let of = |v: u32| own[v as usize];
-            let values =
-                taken.iter().flat_map(|&v| mesh.fields.iter().map(move |field| field.values[v as usize]));
-            let fragment = Fragment {
-                points: taken.iter().map(|&v| points[v as usize]).collect(),
-                positions: taken.iter().map(|&v| quantized.positions[v as usize]).collect(),
-                values: values.collect(),
-                shortest: taken.iter().map(|&v| shortest[v as usize]).collect(),
-                ends: taken.iter().map(|&v| ends[v as usize]).collect(),
-                moved: taken
-                    .iter()
-                    .filter(|&&v| quantized.is_moved(v))
-                    .map(|&v| (of(v), quantized.places.at(v).to_array()))
-                    .collect(),
-                tets: group.iter().map(|(_, t)| mesh.tets[*t as usize].map(of)).collect(),
-                inside: here.iter().map(|at| (of(at.point), ranks[at.tet as usize])).collect(),
-                outside: here.iter().filter(|at| at.outside).map(|at| of(at.point)).collect(),
-            };
+        let values = mesh.fields.iter().map(|field| &field.values[..]).collect();
+        let parted = InParts { tets: &mesh.tets, quantized, values, part_of, ends, shortest, ranks };
+        parted.each(|v| points[v as usize], &mut |part, fragment| {
             self.pieces[usize::from(part)].push(index);
-            keep(&format!("part-{part}-{index}"), &fragment)?;
-        }
-        Ok(())
+            keep(&format!("part-{part}-{index}"), &fragment)
+        })
     }
 
     /// Adds the points that were located across pieces, once all pieces have been sorted in.
@@ -280,49 +314,39 @@ impl Fragments {
     ) -> Result<Piece, PartsError> {
         let kept = self.names(part).iter().map(|name| read(name)).collect::<Result<Vec<_>, _>>()?;
         let of_band = self.of_band.get(&(part as u16));
-        let all = || kept.iter().chain(of_band);
-        let mut points: Vec<u32> = all().flat_map(|fragment| &fragment.points).copied().collect();
-        points.sort_unstable();
-        points.dedup();
-        let (count, fields) = (points.len(), self.fields);
-        let mut piece = Piece {
-            positions: vec![[0; 3]; count],
-            values: vec![0.0; count * fields],
-            shortest: vec![0.0; count],
-            earlier: Vec::<Made>::new(),
-            ..Piece::default()
-        };
-        let mut ends = vec![[0; 2]; count];
-        for fragment in all() {
-            let mut at = 0;
-            let mut number = Vec::with_capacity(fragment.points.len());
-            for (i, &point) in fragment.points.iter().enumerate() {
-                // Both ascend.
-                at += points[at..].partition_point(|&other| other < point);
-                number.push(at as u32);
-                piece.positions[at] = fragment.positions[i];
-                piece.shortest[at] = fragment.shortest[i];
-                ends[at] = fragment.ends[i];
-                piece.values[at * fields..][..fields]
-                    .copy_from_slice(&fragment.values[i * fields..][..fields]);
-            }
-            let of = |v: u32| number[v as usize];
-            piece.moved.extend(fragment.moved.iter().map(|&(v, place)| (of(v), place)));
-            piece.tets.extend(fragment.tets.iter().map(|tet| tet.map(of)));
-            piece.inside.extend(fragment.inside.iter().map(|&(v, t)| (of(v), t)));
-            piece.outside.extend(fragment.outside.iter().map(|&v| of(v)));
-        }
-        piece.moved.sort_unstable_by_key(|(v, _)| *v);
-        piece.moved.dedup_by_key(|(v, _)| *v);
-        piece.inside.sort_unstable();
-        piece.outside.sort_unstable();
-        let is_elsewhere = |[first, last]: [u16; 2]| first != last || u32::from(first) != part;
-        let shared = (0..).zip(&ends).filter(|(_, ends)| is_elsewhere(**ends));
-        piece.shared = shared.map(|(v, [first, last])| (v, u32::from(*first), u32::from(*last))).collect();
-        let from = self.interface.partition_point(|(other, ..)| u32::from(*other) < part);
-        let faces = self.interface[from..].iter().take_while(|(other, ..)| u32::from(*other) == part);
-        let number = |v: u32| points.partition_point(|&other| other < v) as u32;
-        piece.interface = faces.map(|&(_, face, other)| (face.map(number), u32::from(other))).collect();
-        Ok(Piece { points, ..piece })
+        Ok(joined(part, self.fields, kept.iter().chain(of_band), &self.interface))
     }
+}
+
+/// A part of what pieces have of it; `interface` has the faces of all parts.
+pub(super) fn joined<'f>(
+    part: u32,
+    fields: usize,
+    fragments: impl Iterator<Item = &'f Fragment> + Clone,
+    interface: &[(u16, [u32; 3], u16)],
+) -> Piece {
+    let mut piece = Piece::over(fragments.clone().map(|fragment| &fragment.points), fields);
+    let mut ends = vec![[0; 2]; piece.points.len()];
+    for fragment in fragments {
+        let Fragment { points, positions, values, shortest, .. } = fragment;
+        let number = piece.put(points, positions, values, shortest);
+        number.iter().zip(&fragment.ends).for_each(|(&v, own)| ends[v as usize] = *own);
+        let of = |v: u32| number[v as usize];
+        piece.moved.extend(fragment.moved.iter().map(|&(v, place)| (of(v), place)));
+        piece.tets.extend(fragment.tets.iter().map(|tet| tet.map(of)));
+        piece.inside.extend(fragment.inside.iter().map(|&(v, t)| (of(v), t)));
+        piece.outside.extend(fragment.outside.iter().map(|&v| of(v)));
+    }
+    piece.moved.sort_unstable_by_key(|(v, _)| *v);
+    piece.moved.dedup_by_key(|(v, _)| *v);
+    piece.inside.sort_unstable();
+    piece.outside.sort_unstable();
+    let is_elsewhere = |[first, last]: [u16; 2]| first != last || u32::from(first) != part;
+    let shared = (0..).zip(&ends).filter(|(_, ends)| is_elsewhere(**ends));
+    piece.shared = shared.map(|(v, [first, last])| (v, u32::from(*first), u32::from(*last))).collect();
+    let from = interface.partition_point(|(other, ..)| u32::from(*other) < part);
+    let faces = interface[from..].iter().take_while(|(other, ..)| u32::from(*other) == part);
+    let number = |v: u32| piece.points.partition_point(|&other| other < v) as u32;
+    piece.interface = faces.map(|&(_, face, other)| (face.map(number), u32::from(other))).collect();
+    piece
 }

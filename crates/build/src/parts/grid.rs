@@ -4,13 +4,13 @@
 
 use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
-use super::piece::{Head, Part, Piece};
-use super::plan::{Node, Plan};
+use super::piece::{Part, Piece};
+use super::plan::Plan;
 use crate::error::points::as_vec;
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
 use crate::lattice::position_lattice;
-use crate::lattice::quantize::{self, Quantized};
+use crate::lattice::quantize;
 use crate::restrict::preserve::NEAR;
 use crate::restrict::restrictions::Restrictions;
 use crate::{BuildConfig, BuildError, Purpose};
@@ -110,8 +110,7 @@ impl<'a> GridCut<'a> {
 
     /// All points of the grid: their indices.
     fn points(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
-        let [nx, ny, nz] = self.grid.dims;
-        (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
+        indices(self.grid.dims.map(|n| 0..n))
     }
 
     /// A point on the lattice.
@@ -186,17 +185,13 @@ impl<'a> GridCut<'a> {
         let sides = self.position(self.grid.dims.map(|n| n - 1));
         let whole = (self.boxes.len() as u32, self.checksum(), sides);
         let plan = Plan::new(&info, config, purpose, whole, metadata);
-        Restrictions::of_angles(config, &self.lattice_alone(&info))?;
+        // Angles are measured by the lattices alone.
+        let alone = quantize::lattices_alone(info.lattice, info.fields.clone(), info.quantization);
+        Restrictions::of_angles(config, &alone)?;
         for (index, cells) in (0..).zip(&self.boxes) {
-            let head = Head { plan: plan.clone(), node: Node { level: 0, index }, built: false };
-            put(Part { head, piece: self.piece(index, cells) })?;
+            put(Part::of(&plan, index, self.piece(index, cells)))?;
         }
         Ok(plan)
-    }
-
-    /// The lattices, without points: what angles are measured by.
-    fn lattice_alone(&self, info: &MtInfo) -> Quantized {
-        quantize::lattices_alone(info.lattice, info.fields.clone(), info.quantization)
     }
 
     fn info(&self, config: &BuildConfig) -> Result<MtInfo, PartsError> {
@@ -252,24 +247,14 @@ impl<'a> GridCut<'a> {
         let of_whole = |[x, y, z]: [u32; 3]| x + nx * (y + ny * z);
         // Points go one further than cells.
         let [xs, ys, zs] = cells.clone().map(|cells| cells.start..cells.end + 1);
-        let here: Vec<[u32; 3]> = zs
-            .clone()
-            .flat_map(|z| {
-                let xs = xs.clone();
-                ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
-            })
-            .collect();
+        let here: Vec<[u32; 3]> = indices([xs.clone(), ys.clone(), zs.clone()]).collect();
         let (across, layer) = (xs.len() as u32, (xs.len() * ys.len()) as u32);
         let local = |[x, y, z]: [u32; 3]| (x - xs.start) + across * (y - ys.start) + layer * (z - zs.start);
         let cube = kuhn_tets([2; 3]);
         let mut tets = Vec::with_capacity(6 * cells.iter().map(Range::len).product::<usize>());
-        for z in cells[2].clone() {
-            for y in cells[1].clone() {
-                for x in cells[0].clone() {
-                    let corner = |v: u32| local([x + (v & 1), y + (v >> 1 & 1), z + (v >> 2)]);
-                    tets.extend(cube.iter().map(|tet| tet.map(corner)));
-                }
-            }
+        for [x, y, z] in indices(cells.clone()) {
+            let corner = |v: u32| local([x + (v & 1), y + (v >> 1 & 1), z + (v >> 2)]);
+            tets.extend(cube.iter().map(|tet| tet.map(corner)));
         }
         let values = |p: &[u32; 3]| {
             let at = of_whole(*p) as usize;
@@ -299,17 +284,8 @@ impl<'a> GridCut<'a> {
     /// The first and the last part that have a point.
     fn parts_at(&self, p: [u32; 3]) -> [u32; 2] {
         let along = |k: usize| p[k].saturating_sub(1)..(p[k] + 1).min(self.grid.dims[k] - 1);
-        let [xs, ys, zs] = [0, 1, 2].map(along);
-        let mut ends = [u32::MAX, 0];
-        for z in zs {
-            for y in ys.clone() {
-                for x in xs.clone() {
-                    let part = self.part_of([x, y, z]);
-                    ends = [ends[0].min(part), ends[1].max(part)];
-                }
-            }
-        }
-        ends
+        let parts = indices([0, 1, 2].map(along)).map(|cell| self.part_of(cell));
+        parts.fold([u32::MAX, 0], |ends, part| [ends[0].min(part), ends[1].max(part)])
     }
 
     /// The square of the shortest edge at a point: one along an axis.
@@ -362,4 +338,12 @@ impl<'a> GridCut<'a> {
         faces.sort_unstable();
         faces
     }
+}
+
+/// All indices in a box, x fastest.
+fn indices([xs, ys, zs]: [Range<u32>; 3]) -> impl Iterator<Item = [u32; 3]> {
+    zs.flat_map(move |z| {
+        let xs = xs.clone();
+        ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
+    })
 }

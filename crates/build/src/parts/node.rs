@@ -139,7 +139,7 @@ fn state<'a>(
     let points = piece.points.len();
     let is_reference = node.level == 0;
     let boundary = match is_reference {
-        true => faces_to_nothing(piece, &neighbors),
+        true => boundary_faces(&piece.tets, &neighbors).map(|(_, face)| face).collect(),
         false => piece.boundary.clone(),
     };
     let boundary = BoundaryDistance::of(boundary, &quantized.scaled());
@@ -195,11 +195,6 @@ fn mark_interface(piece: &Piece, neighbors: &mut [[u32; 4]]) -> Result<(), Parts
     } else {
         Err(PartsError::Damaged { what: "its faces to other parts are not there" })
     }
-}
-
-/// The boundary of the reference mesh.
-fn faces_to_nothing(piece: &Piece, neighbors: &[[u32; 4]]) -> Vec<[u32; 3]> {
-    boundary_faces(&piece.tets, neighbors).map(|(_, face)| face).collect()
 }
 
 /// The tetrahedra that are left.
@@ -309,32 +304,12 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
 
 /// The pieces of a node as one.
 fn joined(plan: &Plan, node: Node, pieces: Vec<Piece>) -> Piece {
-    let mut points: Vec<u32> = pieces.iter().flat_map(|piece| &piece.points).copied().collect();
-    points.sort_unstable();
-    points.dedup();
-    let mut all = Piece::default();
-    let mut of_point = Vec::new();
-    let (count, fields) = (points.len(), plan.fields.len());
-    all.positions = vec![[0; 3]; count];
-    all.values = vec![0.0; count * fields];
-    all.shortest = vec![0.0; count];
+    let mut all = Piece::over(pieces.iter().map(|piece| &piece.points), plan.fields.len());
     let own = plan.parts_of(node);
     let is_open = |&(_, first, last): &(u32, u32, u32)| !own.contains(&first) || !own.contains(&last);
     for piece in pieces {
-        of_point.clear();
-        // Both ascend.
-        let mut at = 0;
-        for &point in &piece.points {
-            at += points[at..].partition_point(|&other| other < point);
-            of_point.push(at as u32);
-        }
+        let of_point = all.put(&piece.points, &piece.positions, &piece.values, &piece.shortest);
         let number = |v: u32| of_point[v as usize];
-        for (i, &v) in of_point.iter().enumerate() {
-            let v = v as usize;
-            all.positions[v] = piece.positions[i];
-            all.shortest[v] = piece.shortest[i];
-            all.values[v * fields..][..fields].copy_from_slice(&piece.values[i * fields..][..fields]);
-        }
         let (first_tet, first_made) = (all.tets.len() as u32, all.earlier.len() as u32);
         let in_bucket = |&(v, t): &(u32, u32)| (number(v), first_tet + t);
         all.moved.extend(piece.moved.iter().map(|&(v, place)| (number(v), place)));
@@ -363,6 +338,5 @@ fn joined(plan: &Plan, node: Node, pieces: Vec<Piece>) -> Piece {
     all.moved.dedup_by_key(|(v, _)| *v);
     all.shared.sort_unstable();
     all.shared.dedup();
-    all.points = points;
     all
 }

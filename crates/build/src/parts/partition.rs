@@ -4,16 +4,17 @@
 
 use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
+use super::fragments::{InParts, ends, joined, ranks};
 use super::grid::GridCut;
-use super::piece::{Head, Made, Part, Piece};
-use super::plan::{MOST_PARTS, Node, Plan};
+use super::piece::{Part, Piece};
+use super::plan::{Plan, purpose};
 use crate::lattice::field_selection;
 use crate::lattice::quantize::{self, Quantized};
 use crate::restrict::restrictions::Restrictions;
-use crate::{BuildConfig, BuildCriterion, BuildError, Construction};
+use crate::{BuildConfig, BuildCriterion, BuildError};
 use std::collections::BTreeMap;
 use tetralod::geom::Bounds;
-use tetralod::mesh::{FACES, NONE, TetMesh};
+use tetralod::mesh::{FACES, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
 /// Parts `mesh`, which must be valid, or a grid alone ([`TetMesh::of_grid_alone`]), of which no more than the values and a part are in
@@ -29,10 +30,7 @@ pub fn part(
     metadata: BTreeMap<String, String>,
     put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
 ) -> Result<Plan, PartsError> {
-    let Construction::HalfEdge { purpose } = config.construction else { return Err(PartsError::Kind) };
-    if !parts.is_power_of_two() || parts > MOST_PARTS {
-        return Err(PartsError::Count { parts });
-    }
+    let purpose = purpose(config, parts)?;
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge.into());
     }
@@ -62,13 +60,31 @@ pub fn part(
     let whole = (parts, checksum(mesh), sides(&quantized.positions));
     let plan = Plan::new(&info, config, purpose, whole, metadata);
     let part_of = parts_of(&mesh.tets, &quantized, parts)?;
-    let cut = Cut::new(mesh, config, &quantized, &part_of)?;
-    let cut = Cut { restrictions, ..cut };
-    let mut local = vec![NONE; mesh.positions.len()];
-    for index in 0..parts {
-        let head = Head { plan: plan.clone(), node: Node { level: 0, index }, built: false };
-        put(Part { head, piece: cut.piece(index, &mut local) })?;
+    let ends = ends(mesh.positions.len(), &mesh.tets, &part_of);
+    if let Some(point) = ends.iter().position(|[first, last]| first > last) {
+        return Err(PartsError::UnusedPoint { point: point as u32 });
     }
+    let chosen = field_selection::fields(mesh, config)?;
+    let interface = interface(&mesh.tets, &part_of, &ends)?;
+    let is_located = !quantized.locations.is_empty();
+    let cut = InParts {
+        tets: &mesh.tets,
+        quantized: &quantized,
+        values: chosen.iter().map(|field| &field.values[..]).collect(),
+        part_of: &part_of,
+        ends: &ends,
+        shortest: &quantized.shortest_edges(&mesh.tets),
+        ranks: &if is_located { ranks(&part_of, &mut vec![0; parts as usize]) } else { Vec::new() },
+    };
+    cut.each(|v| v, &mut |part, fragment| {
+        let index = u32::from(part);
+        let piece = joined(index, chosen.len(), std::iter::once(&fragment), &interface);
+        let regions = part_of.iter().zip(restrictions.regions()).filter(|(of, _)| **of == part);
+        let regions = regions.map(|(_, &region)| region).collect();
+        let kept = (0..).zip(&piece.points).filter(|(_, v)| restrictions.keeps(**v));
+        let kept = kept.map(|(i, _)| i).collect();
+        put(Part::of(&plan, index, Piece { regions, kept, ..piece }))
+    })?;
     Ok(plan)
 }
 
@@ -119,113 +135,6 @@ fn parts_of(tets: &[[u32; 4]], quantized: &Quantized, parts: u32) -> Result<Vec<
         }
     }
     Ok(part_of)
-}
-
-/// A mesh with its parts.
-struct Cut<'a> {
-    mesh: &'a TetMesh,
-    quantized: &'a Quantized,
-    part_of: &'a [u16],
-    values: Vec<&'a [f64]>,
-    shortest: Vec<f64>,
-    /// The first and the last part that has each point.
-    shared: Vec<[u16; 2]>,
-    /// The faces between parts, those of each part in a row.
-    interface: Vec<(u16, [u32; 3], u16)>,
-    /// The number of each tetrahedron in its part, if that is needed.
-    ranks: Vec<u32>,
-    restrictions: Restrictions,
-}
-
-impl<'a> Cut<'a> {
-    fn new(
-        mesh: &'a TetMesh,
-        config: &BuildConfig,
-        quantized: &'a Quantized,
-        part_of: &'a [u16],
-    ) -> Result<Self, PartsError> {
-        let mut shared = vec![[u16::MAX, 0]; mesh.positions.len()];
-        for (tet, &part) in mesh.tets.iter().zip(part_of) {
-            for &v in tet {
-                let [first, last] = &mut shared[v as usize];
-                (*first, *last) = ((*first).min(part), (*last).max(part));
-            }
-        }
-        if let Some(point) = shared.iter().position(|[first, last]| first > last) {
-            return Err(PartsError::UnusedPoint { point: point as u32 });
-        }
-        let chosen = field_selection::fields(mesh, config)?;
-        let interface = interface(&mesh.tets, part_of, &shared)?;
-        let values = chosen.into_iter().map(|field| &field.values[..]).collect();
-        let shortest = quantized.shortest_edges(&mesh.tets);
-        let is_needed = !quantized.locations.is_empty();
-        let ranks = if is_needed { ranks(part_of) } else { Vec::new() };
-        let restrictions = Restrictions::default();
-        Ok(Self { mesh, quantized, part_of, values, shortest, shared, interface, ranks, restrictions })
-    }
-
-    /// A part. `local` has [`NONE`] for each point, before and after.
-    fn piece(&self, index: u32, local: &mut [u32]) -> Piece {
-        let own = |part: u16| u32::from(part) == index;
-        let quantized = self.quantized;
-        let tets = || self.mesh.tets.iter().zip(self.part_of).filter(|(_, part)| own(**part));
-        let here = |tet: u32| own(self.part_of[tet as usize]);
-        let mut points: Vec<u32> = Vec::new();
-        let located = quantized.locations.iter().filter(|at| here(at.tet)).map(|at| at.point);
-        for v in tets().flat_map(|(tet, _)| *tet).chain(located) {
-            if local[v as usize] == NONE {
-                local[v as usize] = 0;
-                points.push(v);
-            }
-        }
-        points.sort_unstable();
-        (0..).zip(&points).for_each(|(i, &v)| local[v as usize] = i);
-        let number = |v: u32| local[v as usize];
-        let first = self.interface.partition_point(|(part, ..)| u32::from(*part) < index);
-        let faces = self.interface[first..].iter().take_while(|(part, ..)| own(*part));
-        let here_located = || quantized.locations.iter().filter(|at| here(at.tet));
-        let piece = Piece {
-            positions: points.iter().map(|&v| quantized.positions[v as usize]).collect(),
-            values: points.iter().flat_map(|&v| self.values.iter().map(move |all| all[v as usize])).collect(),
-            shortest: points.iter().map(|&v| self.shortest[v as usize]).collect(),
-            moved: points
-                .iter()
-                .filter(|&&v| quantized.is_moved(v))
-                .map(|&v| (number(v), quantized.places.at(v).to_array()))
-                .collect(),
-            shared: points
-                .iter()
-                .filter_map(|&v| {
-                    let [first, last] = self.shared[v as usize];
-                    (first != last || !own(first)).then(|| (number(v), u32::from(first), u32::from(last)))
-                })
-                .collect(),
-            tets: tets().map(|(tet, _)| tet.map(number)).collect(),
-            interface: faces.map(|&(_, face, other)| (face.map(number), u32::from(other))).collect(),
-            inside: here_located().map(|at| (number(at.point), self.ranks[at.tet as usize])).collect(),
-            outside: here_located().filter(|at| at.outside).map(|at| number(at.point)).collect(),
-            regions: (0..)
-                .zip(self.restrictions.regions())
-                .filter(|(tet, _)| here(*tet))
-                .map(|(_, &region)| region)
-                .collect(),
-            kept: points.iter().filter(|&&v| self.restrictions.keeps(v)).map(|&v| number(v)).collect(),
-            earlier: Vec::<Made>::new(),
-            ..Piece::default()
-        };
-        points.iter().for_each(|&v| local[v as usize] = NONE);
-        Piece { points, ..piece }
-    }
-}
-
-/// The number of each tetrahedron in its part.
-fn ranks(part_of: &[u16]) -> Vec<u32> {
-    let mut next = vec![0; usize::from(part_of.iter().copied().max().unwrap_or(0)) + 1];
-    let mut rank = |&part: &u16| {
-        next[usize::from(part)] += 1;
-        next[usize::from(part)] - 1
-    };
-    part_of.iter().map(&mut rank).collect()
 }
 
 /// The faces between parts: the part, the corners in ascending order, and the other part; those of each part in a row.

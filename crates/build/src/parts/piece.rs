@@ -136,6 +136,41 @@ impl From<RemoverCode> for Remover {
     }
 }
 
+impl Piece {
+    /// The points of several pieces, each once, which are to be [put](Self::put) there.
+    pub fn over<'p>(pieces: impl Iterator<Item = &'p Vec<u32>>, fields: usize) -> Self {
+        let mut points: Vec<u32> = pieces.flatten().copied().collect();
+        points.sort_unstable();
+        points.dedup();
+        let count = points.len();
+        let (positions, values, shortest) =
+            (vec![[0; 3]; count], vec![0.0; count * fields], vec![0.0; count]);
+        Self { points, positions, values, shortest, ..Self::default() }
+    }
+
+    /// Puts points of a piece where they are here; returns where.
+    pub fn put(
+        &mut self,
+        points: &[u32],
+        positions: &[[i32; 3]],
+        values: &[f64],
+        shortest: &[f64],
+    ) -> Vec<u32> {
+        let fields = values.len() / points.len().max(1);
+        let mut at = 0;
+        let mut numbers = Vec::with_capacity(points.len());
+        for (i, &point) in points.iter().enumerate() {
+            // Both ascend.
+            at += self.points[at..].partition_point(|&other| other < point);
+            numbers.push(at as u32);
+            self.positions[at] = positions[i];
+            self.shortest[at] = shortest[i];
+            self.values[at * fields..][..fields].copy_from_slice(&values[i * fields..][..fields]);
+        }
+        numbers
+    }
+}
+
 impl UpdateRows {
     /// The first so many updates, and the others.
     pub fn split(mut self, count: usize, fields: usize) -> (Self, Self) {
@@ -166,9 +201,9 @@ impl Plan {
 }
 
 impl Part {
-    /// The plan that the part belongs to.
-    pub fn plan(&self) -> &Plan {
-        &self.head.plan
+    /// A part of the reference mesh.
+    pub(super) fn of(plan: &Plan, index: u32, piece: Piece) -> Self {
+        Self { head: Head { plan: plan.clone(), node: Node { level: 0, index }, built: false }, piece }
     }
 
     /// Which part it is.

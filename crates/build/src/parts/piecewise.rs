@@ -7,20 +7,20 @@ use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
 use super::fragments::{Band, Fragments, PieceParts};
 use super::partition::{between, shared_faces};
-use super::piece::{Head, Part};
-use super::plan::{MOST_PARTS, Node, Plan};
+use super::piece::Part;
+use super::plan::{Plan, purpose};
 use super::prepared::{Prepared, Stored, Whole, places};
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
 use crate::lattice::position_lattice;
 use crate::lattice::quantize::{self, Quantized};
 use crate::restrict::restrictions::Restrictions;
-use crate::{BuildConfig, BuildError, Construction, Purpose};
+use crate::{BuildConfig, BuildError, Purpose};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::io;
-use tetralod::geom::{Bounds, Lattice, WIDE_BITS, orient3d};
+use tetralod::geom::{Bounds, Lattice, WIDE_BITS};
 use tetralod::mesh::{FACES, Field, MAX_TETS, MeshInput, MeshPiece, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
@@ -91,10 +91,7 @@ impl<'a> Piecewise<'a> {
         parts: u32,
         scratch: &'a mut dyn Scratch,
     ) -> Result<Self, PartsError> {
-        let Construction::HalfEdge { purpose } = config.construction else { return Err(PartsError::Kind) };
-        if !parts.is_power_of_two() || parts > MOST_PARTS {
-            return Err(PartsError::Count { parts });
-        }
+        let purpose = purpose(config, parts)?;
         if !config.preserve.is_empty() || !config.keep_points.is_empty() {
             return whole("regions and single points are kept");
         }
@@ -141,9 +138,8 @@ impl<'a> Piecewise<'a> {
             }
         }
         if self.pieces == 0 {
-            let bare = |field: &Field| Field { values: Vec::new(), ..field.clone() };
-            sums.fields = mesh.fields.iter().map(bare).collect();
-            sums.cell_fields = mesh.cell_fields.iter().map(bare).collect();
+            sums.fields = mesh.fields.iter().map(Field::without_values).collect();
+            sums.cell_fields = mesh.cell_fields.iter().map(Field::without_values).collect();
             sums.input.other_fields.clone_from(&mesh.input.other_fields);
             sums.input.other_cell_fields.clone_from(&mesh.input.other_cell_fields);
             sums.of_fields = mesh.fields.iter().map(|_| crc32fast::Hasher::new()).collect();
@@ -212,12 +208,11 @@ impl<'a> Piecewise<'a> {
         let plan = self.plan(&whole, quantization, metadata)?;
         let fragments = self.fragments(&whole, band)?;
         for index in 0..self.parts {
-            let head = Head { plan: plan.clone(), node: Node { level: 0, index }, built: false };
             let piece = fragments.piece(index, |name| self.kept(name))?;
             for name in fragments.names(index) {
                 self.scratch.remove(&name)?;
             }
-            put(Part { head, piece })?;
+            put(Part::of(&plan, index, piece))?;
         }
         for index in 0..self.pieces {
             self.scratch.remove(&format!("piece-{index}"))?;
@@ -294,14 +289,13 @@ impl<'a> Piecewise<'a> {
                 whole("its lattice is refused")
             };
         }
-        let mut found = None;
-        for bits in position_lattice::FEWEST_BITS..=WIDE_BITS {
-            if self.fits(&of(bits))? {
-                found = Some(bits);
-                break;
+        let mut bits = position_lattice::FEWEST_BITS;
+        while !self.fits(&of(bits))? {
+            bits += 1;
+            if bits > WIDE_BITS {
+                return whole("its cells are too thin");
             }
         }
-        let Some(bits) = found else { return whole("its cells are too thin") };
         let finer = bits + position_lattice::SPARE_BITS;
         if bits == position_lattice::FEWEST_BITS || finer > WIDE_BITS || !self.fits(&of(finer))? {
             return Ok(of(bits));
@@ -314,11 +308,7 @@ impl<'a> Piecewise<'a> {
         for index in 0..self.pieces {
             let Stored { positions, tets, .. } = self.stored(index)?;
             let placed: Vec<[i32; 3]> = positions.iter().map(|&p| lattice.nearest(p)).collect();
-            let positive = |tet: &[u32; 4]| {
-                let [a, b, c, d] = tet.map(|v| placed[v as usize]);
-                orient3d(a, b, c, d) > 0
-            };
-            if !tets.iter().all(positive) {
+            if position_lattice::first_flat(&tets, &placed).is_some() {
                 return Ok(false);
             }
         }

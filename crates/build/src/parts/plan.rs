@@ -1,7 +1,7 @@
 //! What all steps know of the whole.
 
 use super::PartsError;
-use crate::{BuildConfig, Purpose};
+use crate::{BuildConfig, Construction, Purpose};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,6 +14,16 @@ pub const MOST_PARTS: u32 = 4096;
 
 /// So many parts are joined at a time: halves along each of three axes.
 const JOINED: u32 = 8;
+
+/// What an MT is built for in so many parts, if it is.
+pub(super) fn purpose(config: &BuildConfig, parts: u32) -> Result<Purpose, PartsError> {
+    let Construction::HalfEdge { purpose } = config.construction else { return Err(PartsError::Kind) };
+    if parts.is_power_of_two() && parts <= MOST_PARTS {
+        Ok(purpose)
+    } else {
+        Err(PartsError::Count { parts })
+    }
+}
 
 /// What is made by one step: at level 0 the parts, numbered so that those that are joined follow one another; above them what each
 /// eight of the level below become.
@@ -146,11 +156,6 @@ impl Plan {
     /// What the file is to say of itself, as it was given to [`part`](super::part).
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
-    }
-
-    /// log2 of the updates of a block.
-    pub fn block_bits(&self) -> u32 {
-        self.block_bits
     }
 
     /// How many nodes each level has; the last one has one.

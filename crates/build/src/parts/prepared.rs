@@ -104,9 +104,4 @@ impl Prepared {
         quantized.locations = locations;
         Ok(Self { points, mesh, quantized, beyond })
     }
-
-    /// For each point the square of the shortest edge there.
-    pub fn shortest(&self) -> Vec<f64> {
-        self.quantized.shortest_edges(&self.mesh.tets)
-    }
 }

@@ -48,10 +48,12 @@ mod shown;
 mod surfaces;
 
 #[doc(hidden)]
+pub use queries::Query as SampleRequest;
+#[doc(hidden)]
 pub use report::MAX_FAILURES;
 pub use report::VerifyReport;
 #[doc(hidden)]
-pub use samples::{SampleRequest, run_request, samples};
+pub use samples::{run_request, samples};
 #[doc(hidden)]
 pub use shown::run_shown;
 
@@ -173,17 +175,13 @@ fn with<M: ApplyUpdates>(
     plan: &dyn Fn(&TetMesh) -> Plan,
     on_progress: &mut dyn FnMut(u32, u32),
 ) -> VerifyReport {
-    let mut report = VerifyReport::default();
-    let mut check = |input: &TetMesh| verify(mt, input, &plan(input), on_progress, &mut report);
-    let verified = match reference {
-        Reference::Mesh => check(input),
-        Reference::Points => points::triangulated(mt, input).and_then(|mesh| check(&mesh)),
-    };
-    if let Err(failures) = verified {
-        report.failures.push(failures);
-    }
-    report.valid = report.failures.is_empty();
-    report
+    VerifyReport::of(|report| {
+        let mut check = |input: &TetMesh| verify(mt, input, &plan(input), on_progress, report);
+        match reference {
+            Reference::Mesh => check(input),
+            Reference::Points => points::triangulated(mt, input).and_then(|mesh| check(&mesh)),
+        }
+    })
 }
 
 /// Returns failures after which nothing can be checked; notes the others.

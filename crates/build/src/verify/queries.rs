@@ -7,9 +7,12 @@ use tetralod::mesh::TetMesh;
 use tetralod::mt::{ApplyUpdates, FieldInfo, MtInfo};
 use tetralod::refine::{Budget, LodCriterion, Need, Region, Request, Transfer, View};
 
-/// A request with a name.
+/// A request that an MT is tried with.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Query {
+    /// What it is, in words.
     pub name: String,
+    /// The request.
     pub request: Request,
 }
 
@@ -20,11 +23,11 @@ impl fmt::Display for Query {
 }
 
 impl Query {
-    pub fn new(name: &str, request: impl Into<Request>) -> Self {
+    pub(super) fn new(name: &str, request: impl Into<Request>) -> Self {
         Self { name: name.to_owned(), request: request.into() }
     }
 
-    pub fn criterion(&self, info: &MtInfo) -> LodCriterion {
+    pub(super) fn criterion(&self, info: &MtInfo) -> LodCriterion {
         LodCriterion::new(info, &self.request)
     }
 }

@@ -16,6 +16,16 @@ pub struct VerifyReport {
 }
 
 impl VerifyReport {
+    /// What a check has found; its error is a failure after which nothing can be checked.
+    pub(super) fn of(check: impl FnOnce(&mut Self) -> Result<(), String>) -> Self {
+        let mut report = Self::default();
+        if let Err(failure) = check(&mut report) {
+            report.failures.push(failure);
+        }
+        report.valid = report.failures.is_empty();
+        report
+    }
+
     /// Adds what other checks of the same MT have found.
     pub fn add(&mut self, other: Self) {
         self.valid &= other.valid;

@@ -11,15 +11,6 @@ use tetralod::mesh::{FACES, Field, Grid, NONE, TetMesh, boundary_faces, kuhn_tet
 use tetralod::mt::{ApplyUpdates, MtInfo, mix};
 use tetralod::refine::{Need, Part, Region, Request};
 
-/// A request that an MT is tried with.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SampleRequest {
-    /// What it is, in words.
-    pub name: String,
-    /// The request.
-    pub request: Request,
-}
-
 /// A box has about so many tetrahedra of the reference mesh.
 const BOX_TETS: f64 = 20_000.0;
 /// The errors of boxes, one after the other.
@@ -32,12 +23,11 @@ const VERTICES: usize = 20_000;
 /// So many requests for an MT of `input`, a mesh or a [grid alone](TetMesh::of_grid_alone): the whole domain within the error `coarse`,
 /// which should be one of a mesh that fits into memory, then boxes all over it, exactly or with an error, and values in boxes. They
 /// follow from the input and `count` alone.
-pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec<SampleRequest> {
+pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec<Query> {
     let whole = bounds(input);
     let mut numbers = Numbers(0x5DEE_CE66_D1CE_4E5B);
     let part = (BOX_TETS / f64::from(info.tetrahedra.max(1))).min(1.0).cbrt();
-    let mut all =
-        vec![SampleRequest { name: format!("everywhere, error {coarse}"), request: Request::within(coarse) }];
+    let mut all = vec![Query::new(&format!("everywhere, error {coarse}"), Request::within(coarse))];
     while all.len() < count {
         let i = all.len();
         let mut inside = whole;
@@ -56,8 +46,7 @@ pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec
         } else {
             ("box".to_owned(), need)
         };
-        let name = format!("{what} {:?} to {:?}, error {error}", inside.min, inside.max);
-        all.push(SampleRequest { name, request: need.into() });
+        all.push(Query::new(&format!("{what} {:?} to {:?}, error {error}", inside.min, inside.max), need));
     }
     all.truncate(count);
     all
@@ -67,24 +56,18 @@ pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec
 /// valid and conforming and has the topology of the base mesh, that all errors are within their bounds, where they are measured, that the
 /// answer is true, and that coarsening leads back to the base mesh. In a box with error 0 the tetrahedra must be those of the input.
 /// `mt` needs to have only what the request needs.
-pub fn run_request<M: ApplyUpdates>(mt: &M, input: &TetMesh, sample: &SampleRequest) -> VerifyReport {
-    let mut report = VerifyReport::default();
-    if let Err(failure) = check(mt, input, sample, &mut report) {
-        report.failures.push(failure);
-    }
-    report.valid = report.failures.is_empty();
-    report
+pub fn run_request<M: ApplyUpdates>(mt: &M, input: &TetMesh, query: &Query) -> VerifyReport {
+    VerifyReport::of(|report| check(mt, input, query, report))
 }
 
 fn check<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
-    sample: &SampleRequest,
+    query: &Query,
     report: &mut VerifyReport,
 ) -> Result<(), String> {
     let info = mt.info();
     check_counts(info, input)?;
-    let query = Query::new(&sample.name, sample.request.clone());
     let around = match &query.request.needs[..] {
         [need] => region(need).map(|inside| (inside, need)),
         _ => None,
@@ -104,21 +87,21 @@ fn check<M: ApplyUpdates>(
     let shape = Shape::of(&PlainReference { positions: plain.positions, levels: &[], tets: plain.tets })
         .map_err(|failure| format!("the base mesh: {failure}"))?;
     let mut front = base.clone();
-    let outcome = satisfy(mt, &mut front, &query)?;
+    let outcome = satisfy(mt, &mut front, query)?;
     if outcome.missing {
-        note(report, &query, "blocks that it needs are not here");
+        note(report, query, "blocks that it needs are not here");
     }
-    Case { mt, query: &query, front: &front, outcome: &outcome }.check(&base, &shape, &mut deviation, report);
+    Case { mt, query, front: &front, outcome: &outcome }.check(&base, &shape, &mut deviation, report);
     report.queries += 1;
     let exact = |(_, need): &(Bounds, &Need)| need.error == 0.0 && matches!(need.part, Part::Region(_));
     if let Some((inside, _)) = around.filter(exact)
         && let Err(failure) = check_tets(info, &near.mesh, &inside, &PlainMesh::of(front.mesh()))
     {
-        note(report, &query, &failure);
+        note(report, query, &failure);
     }
     satisfy(mt, &mut front, &Query::new("full coarsening", Request::within(f64::INFINITY)))?;
     if front.mesh().hash() != base.mesh().hash() {
-        note(report, &query, "what is left after coarsening is not the base mesh");
+        note(report, query, "what is left after coarsening is not the base mesh");
     }
     Ok(())
 }
@@ -272,15 +255,7 @@ fn values(input: &TetMesh, points: &[usize]) -> Result<Vec<Field>, String> {
     let of = |field: &Field| {
         let values: Option<Vec<f64>> = points.iter().map(|&v| field.values.get(v).copied()).collect();
         let values = values.ok_or_else(|| format!("the input: field '{}' lacks values", field.name))?;
-        let Field { name, unit, vector, time, integer, .. } = field;
-        Ok(Field {
-            name: name.clone(),
-            values,
-            unit: unit.clone(),
-            vector: vector.clone(),
-            time: *time,
-            integer: *integer,
-        })
+        Ok(Field { values, ..field.without_values() })
     };
     input.fields.iter().map(of).collect()
 }

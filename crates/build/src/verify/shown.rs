@@ -32,12 +32,7 @@ const NORMALS: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.62, -0.41,
 ///
 /// All must have arrived.
 pub fn run_shown(session: &mut Session, input: &TetMesh, reference: Reference) -> VerifyReport {
-    let mut report = VerifyReport::default();
-    if let Err(failure) = check(session, input, reference, &mut report) {
-        report.failures.push(failure);
-    }
-    report.valid = report.failures.is_empty();
-    report
+    VerifyReport::of(|report| check(session, input, reference, report))
 }
 
 fn check(

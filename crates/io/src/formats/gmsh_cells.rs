@@ -12,30 +12,32 @@ pub(super) struct Element {
     pub flat: i64,
 }
 
-const fn flat(points: usize) -> Element {
-    Element { points, cell: None, flat: 0 }
+const fn flat(points: usize, kind: i64) -> Element {
+    Element { points, cell: None, flat: kind }
 }
 
 const fn solid(kind: i64, order: &'static [usize]) -> Element {
     Element { points: order.len(), cell: Some((kind, order)), flat: 0 }
 }
 
-/// A type of elements that has a volume, but is not split: the number of none of VTK's.
-const HIGHER_ORDER: i64 = -1;
+/// VTK's types of lines, triangles and quadrilaterals of any order.
+const LINE: i64 = 68;
+const TRIANGLE: i64 = 69;
+const QUADRILATERAL: i64 = 70;
 
-/// The type of this number.
+/// The type of this number; none if it is not known, or has a volume and an order above two.
 pub(super) fn element(kind: i64) -> Option<Element> {
-    let element = match kind {
-        1 => flat(2),
-        2 => flat(3),
-        3 => flat(4),
+    Some(match kind {
+        1 => flat(2, 3),
+        2 => flat(3, 5),
+        3 => flat(4, 9),
         4 => solid(10, &[0, 1, 2, 3]),
         5 => solid(12, &[0, 1, 2, 3, 4, 5, 6, 7]),
         6 => solid(13, &[0, 1, 2, 3, 4, 5]),
         7 => solid(14, &[0, 1, 2, 3, 4]),
-        8 => flat(3),
-        9 => flat(6),
-        10 => flat(9),
+        8 => flat(3, 21),
+        9 => flat(6, 22),
+        10 => flat(9, 28),
         11 => solid(24, &[0, 1, 2, 3, 4, 5, 6, 7, 9, 8]),
         12 => solid(
             29,
@@ -46,52 +48,23 @@ pub(super) fn element(kind: i64) -> Option<Element> {
         ),
         13 => solid(32, &[0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16]),
         14 => solid(PYRAMID_14, &[0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12, 13]),
-        15 => flat(1),
-        16 => flat(8),
+        15 => flat(1, 1),
+        16 => flat(8, 23),
         17 => solid(25, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]),
         18 => solid(26, &[0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]),
         19 => solid(27, &[0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12]),
-        20 => flat(9),
-        21 => flat(10),
-        22 => flat(12),
-        23 | 24 => flat(15),
-        25 => flat(21),
-        26 => flat(4),
-        27 => flat(5),
-        28 => flat(6),
-        29 => Element { points: 20, cell: Some((HIGHER_ORDER, &[])), flat: 0 },
-        30 => Element { points: 35, cell: Some((HIGHER_ORDER, &[])), flat: 0 },
-        31 => Element { points: 56, cell: Some((HIGHER_ORDER, &[])), flat: 0 },
-        36 => flat(16),
-        37 => flat(25),
+        20 => flat(9, TRIANGLE),
+        21 => flat(10, TRIANGLE),
+        22 => flat(12, TRIANGLE),
+        23 | 24 => flat(15, TRIANGLE),
+        25 => flat(21, TRIANGLE),
+        26 => flat(4, LINE),
+        27 => flat(5, LINE),
+        28 => flat(6, LINE),
+        36 => flat(16, QUADRILATERAL),
+        37 => flat(25, QUADRILATERAL),
         _ => return None,
-    };
-    Some(Element { flat: flat_kind(kind), ..element })
-}
-
-/// VTK's type for the elements of this number, which have no volume.
-fn flat_kind(kind: i64) -> i64 {
-    match kind {
-        1 => 3,
-        2 => 5,
-        3 => 9,
-        8 => 21,
-        9 => 22,
-        10 => 28,
-        15 => 1,
-        16 => 23,
-        // Lines, triangles and quadrilaterals of any order.
-        26..=28 => 68,
-        36 | 37 => 70,
-        _ => 69,
-    }
-}
-
-impl Element {
-    /// Whether it has a volume and an order above two.
-    pub fn is_of_higher_order(&self) -> bool {
-        self.cell.is_some_and(|(kind, _)| kind == HIGHER_ORDER)
-    }
+    })
 }
 
 #[cfg(test)]
@@ -103,7 +76,7 @@ mod tests {
     fn every_order_names_each_point_once() {
         for kind in 1..40 {
             let Some(element) = element(kind) else { continue };
-            let Some((vtk, order)) = element.cell.filter(|_| !element.is_of_higher_order()) else { continue };
+            let Some((vtk, order)) = element.cell else { continue };
             let mut sorted = order.to_vec();
             sorted.sort_unstable();
             assert!(sorted.iter().copied().eq(0..element.points), "{kind}");

@@ -221,8 +221,7 @@ fn read_element_blocks(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Re
 }
 
 fn known(kind: i64) -> Result<Element, ReadReason> {
-    let known = element(kind).filter(|element| !element.is_of_higher_order());
-    known.ok_or_else(|| {
+    element(kind).ok_or_else(|| {
         ReadReason::unsupported(
             format!("elements of type {kind}"),
             "save the mesh with elements of the first or second order",

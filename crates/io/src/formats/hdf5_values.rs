@@ -49,26 +49,17 @@ pub(super) fn number_kind(dataset: &Dataset) -> Option<bool> {
     }
 }
 
-/// Reads a part of a dataset as numbers of type `$into`; `$otherwise` is for those that are no integers.
+/// Reads a part of a dataset as numbers of type `$into`; none if they are no integers.
 macro_rules! numbers {
     ($dataset:expr, $selection:expr, $into:ty) => {
+        numbers!($dataset, $selection, $into,
+            1 true i8, 1 false u8, 2 true i16, 2 false u16, 4 true i32, 4 false u32, 8 true i64, 8 false u64)
+    };
+    ($dataset:expr, $selection:expr, $into:ty, $($size:literal $signed:literal $number:ty),*) => {
         match *$dataset.dtype() {
-            Datatype::FixedPoint { size: 1, signed: true, .. } => {
-                Some(part($dataset, $selection, |x: i8| x as $into))
-            }
-            Datatype::FixedPoint { size: 1, .. } => Some(part($dataset, $selection, |x: u8| x as $into)),
-            Datatype::FixedPoint { size: 2, signed: true, .. } => {
-                Some(part($dataset, $selection, |x: i16| x as $into))
-            }
-            Datatype::FixedPoint { size: 2, .. } => Some(part($dataset, $selection, |x: u16| x as $into)),
-            Datatype::FixedPoint { size: 4, signed: true, .. } => {
-                Some(part($dataset, $selection, |x: i32| x as $into))
-            }
-            Datatype::FixedPoint { size: 4, .. } => Some(part($dataset, $selection, |x: u32| x as $into)),
-            Datatype::FixedPoint { size: 8, signed: true, .. } => {
-                Some(part($dataset, $selection, |x: i64| x as $into))
-            }
-            Datatype::FixedPoint { size: 8, .. } => Some(part($dataset, $selection, |x: u64| x as $into)),
+            $(Datatype::FixedPoint { size: $size, signed: $signed, .. } => {
+                Some(part($dataset, $selection, |x: $number| x as $into))
+            })*
             _ => None,
         }
     };

@@ -5,10 +5,11 @@ use std::borrow::Cow;
 
 use crate::error::{At, ReadError, ReadReason, shown};
 use crate::formats::volume::{
-    Axis, MAX_COMPONENTS, SampleArray, Volume, from_files, from_text, numbered_files, numbers, three,
+    Axis, MAX_COMPONENTS, SampleArray, Volume, first, from_files, from_text, numbered_files, numbers, three,
     unpacked, wrong_dimensions,
 };
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
 use flate2::read::ZlibDecoder;
 use tetralod::mesh::TetMesh;
@@ -62,17 +63,14 @@ struct Header {
 
 /// The header, which the name of the file with the samples ends, and what follows.
 fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), ReadReason> {
-    let (mut header, mut rest) = (Header::default(), bytes);
-    while !rest.is_empty() {
-        let length = rest.iter().position(|c| *c == b'\n').map_or(rest.len(), |i| i + 1);
-        let (line, after) = rest.split_at(length);
-        rest = after;
-        let line = String::from_utf8_lossy(line);
+    let (mut header, mut lines) = (Header::default(), Scanner::new(bytes));
+    while !lines.rest().is_empty() {
+        let line = String::from_utf8_lossy(lines.line());
         // Some programs write colons.
         let Some((key, value)) = line.split_once(['=', ':']) else { continue };
         header.set(key.trim(), value.trim())?;
         if !header.file.is_empty() {
-            return Ok((header, rest));
+            return Ok((header, lines.rest()));
         }
     }
     Err(ReadReason::Missing("ElementDataFile".into()))
@@ -97,7 +95,7 @@ impl Header {
             "ElementByteOrderMSB" | "BinaryDataByteOrderMSB" => self.big = is_true(value),
             "CompressedData" => self.compressed = is_true(value),
             "BinaryData" => self.is_text = !is_true(value),
-            "HeaderSize" => self.skipped = numbers(value, key)?.first().copied().unwrap_or(0),
+            "HeaderSize" => self.skipped = first(value, key)?.unwrap_or(0),
             "ElementDataFile" => self.file = text(),
             "ObjectType" if !value.eq_ignore_ascii_case("Image") => {
                 let what = format!("an object of type \"{}\"", shown(value));
@@ -160,8 +158,9 @@ impl Header {
     /// The names of the files with the samples, which a list has line by line; none if they follow.
     fn files(&self, rest: &[u8], dims: [u64; 3]) -> Result<Vec<String>, ReadReason> {
         let words: Vec<&str> = self.file.split_ascii_whitespace().collect();
-        let number =
-            |word: &str| numbers(word, "ElementDataFile").map(|list: Vec<i64>| list.first().copied());
+        let number = |i: usize, words: &[&str]| {
+            words.get(i).map_or(Ok(None), |word| first::<i64>(word, "ElementDataFile"))
+        };
         match *words.as_slice() {
             [local] if local.eq_ignore_ascii_case("LOCAL") => Ok(Vec::new()),
             ["LIST", ref dimension @ ..] => {
@@ -175,10 +174,10 @@ impl Header {
             }
             [pattern, ref range @ ..] if pattern.contains('%') => {
                 // The last slice is found by their number, each has the next number.
-                let first = range.first().map_or(Ok(None), |word| number(word))?.unwrap_or(1);
+                let first = number(0, range)?.unwrap_or(1);
                 let default = first.saturating_add_unsigned(dims[2]).saturating_sub(1);
-                let last = range.get(1).map_or(Ok(None), |word| number(word))?.unwrap_or(default);
-                let step = range.get(2).map_or(Ok(None), |word| number(word))?.unwrap_or(1);
+                let last = number(1, range)?.unwrap_or(default);
+                let step = number(2, range)?.unwrap_or(1);
                 numbered_files(pattern, [first, last, step])
             }
             _ => Ok(vec![self.file.clone()]),

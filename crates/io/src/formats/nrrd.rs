@@ -7,10 +7,11 @@ use std::borrow::Cow;
 
 use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::formats::volume::{
-    Axis, MAX_COMPONENTS, SampleArray, Volume, from_files, from_text, last_unpacked, numbered_files, numbers,
-    unpacked, wrong_dimensions,
+    Axis, MAX_COMPONENTS, SampleArray, Volume, first, from_files, from_text, last_unpacked, numbered_files,
+    numbers, unpacked, wrong_dimensions,
 };
 use crate::number::NumberType;
+use crate::scanner::Scanner;
 use crate::{Beside, MemoryLimit, ReadOptions, error};
 use flate2::read::MultiGzDecoder;
 use tetralod::mesh::TetMesh;
@@ -63,13 +64,10 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
 
 /// The header, which an empty line ends, and what follows.
 fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), ReadReason> {
-    let (mut header, mut rest) = (Header::default(), bytes);
+    let (mut header, mut lines) = (Header::default(), Scanner::new(bytes));
     let mut is_list = false;
     for number in 0_usize.. {
-        let length = rest.iter().position(|c| *c == b'\n').map_or(rest.len(), |i| i + 1);
-        let (line, after) = rest.split_at(length);
-        rest = after;
-        let line = String::from_utf8_lossy(line.trim_ascii_end());
+        let line = String::from_utf8_lossy(lines.line());
         match line.as_ref() {
             "" => break,
             _ if number == 0 => check_version(&line)?,
@@ -81,7 +79,7 @@ fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), ReadReason> {
     if is_list && header.files.is_empty() {
         return Err(ReadReason::Missing("the list of data files".into()));
     }
-    Ok((header, rest))
+    Ok((header, lines.rest()))
 }
 
 fn check_version(line: &str) -> Result<(), ReadReason> {
@@ -109,10 +107,9 @@ impl Header {
     fn set(&mut self, key: &str, value: &str) -> Result<bool, ReadReason> {
         let lower = value.to_ascii_lowercase();
         let words = || lower.split_ascii_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        let one = || Ok(numbers(value, key)?.first().copied());
         match key {
             "type" => self.kind = lower,
-            "dimension" => self.dimension = Some(numbers(value, key)?.first().copied().unwrap_or(0)),
+            "dimension" => self.dimension = Some(first(value, key)?.unwrap_or(0)),
             "sizes" => self.sizes = numbers(value, key)?,
             "kinds" => self.kinds = words(),
             "encoding" => self.encoding = lower,
@@ -123,15 +120,15 @@ impl Header {
             "centers" | "centerings" => self.centers = words(),
             "space directions" => self.directions = Some(value.to_owned()),
             "space origin" => value.clone_into(&mut self.origin),
-            "space dimension" => self.space_dimension = numbers(value, key)?.first().copied(),
+            "space dimension" => self.space_dimension = first(value, key)?,
             "space" if lower.ends_with("-time") || lower.ends_with('t') && lower.len() == 4 => {
                 self.space_dimension = Some(4);
             }
             "data file" | "datafile" => return self.set_files(value),
             "content" => value.clone_into(&mut self.content),
             "sample units" | "sampleunits" => value.trim_matches('"').clone_into(&mut self.unit),
-            "byte skip" | "byteskip" => self.byte_skip = one()?.unwrap_or(0),
-            "line skip" | "lineskip" => self.line_skip = numbers(value, key)?.first().copied().unwrap_or(0),
+            "byte skip" | "byteskip" => self.byte_skip = first(value, key)?.unwrap_or(0),
+            "line skip" | "lineskip" => self.line_skip = first(value, key)?.unwrap_or(0),
             "old min" | "oldmin" => self.old[0] = Some(value.to_owned()),
             "old max" | "oldmax" => self.old[1] = Some(value.to_owned()),
             "measurement frame" => self.has_frame = true,
@@ -327,14 +324,14 @@ impl Header {
         expected: usize,
         memory: &MemoryLimit,
     ) -> Result<Vec<u8>, ReadReason> {
-        let mut data = data;
+        let mut lines = Scanner::new(data);
         for _ in 0..self.line_skip {
-            let line = data.iter().position(|c| *c == b'\n').map_or(data.len(), |i| i + 1);
-            data = &data[line..];
-            if data.is_empty() {
+            lines.skip_line();
+            if lines.rest().is_empty() {
                 break;
             }
         }
+        let data = lines.rest();
         // Minus one: the samples are the end of the data; minus two: a byte stands behind them.
         let skipped = usize::try_from(self.byte_skip);
         let behind = self.byte_skip.saturating_add(1).unsigned_abs() as usize;

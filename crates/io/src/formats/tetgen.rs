@@ -27,7 +27,7 @@ pub(crate) fn read(files: &FilesOf<'_>, path: &Path, options: &ReadOptions) -> R
     let mut file = Scanner::with_comments(&cell_bytes);
     let read = read_cells(&mut file, &mut draft, first);
     read.at(|| file.line_number()).map_err(|error| in_file(error, &name(&cells)))?;
-    draft.finish().at(String::new).map_err(|error| in_file(error, &name(&cells)))
+    draft.finish().in_file(&name(&cells))
 }
 
 /// The numbers of a header; those that are left out at its end are as the format has them.

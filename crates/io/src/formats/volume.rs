@@ -241,6 +241,11 @@ pub(super) fn numbers<T: std::str::FromStr>(text: &str, key: &str) -> Result<Vec
     parsed.map_err(|_| ReadReason::Syntax(format!("{key} \"{text}\" is not a list of numbers")))
 }
 
+/// The first number of a line of a header.
+pub(super) fn first<T: std::str::FromStr + Copy>(text: &str, key: &str) -> Result<Option<T>, ReadReason> {
+    Ok(numbers(text, key)?.first().copied())
+}
+
 /// Three numbers that stand in one line of a header.
 pub(super) fn three<T: std::str::FromStr>(text: &str, key: &str) -> Result<[T; 3], ReadReason> {
     let list = numbers(text, key)?;
