@@ -41,9 +41,7 @@ pub use single::{SinglePoints, SingleValues, keeps_in_single};
 #[doc(hidden)]
 pub use tet_box::{LatticeBox, tet_meets_box};
 #[doc(hidden)]
-pub use triangle::nearest_on_triangle;
-#[doc(hidden)]
-pub use triangle::weights_on_triangle;
+pub use triangle::{nearest_on_triangle, weights_on_triangle};
 #[doc(hidden)]
 pub use triangle_grid::TriangleGrid;
 #[doc(hidden)]

@@ -22,22 +22,12 @@ mod tet;
 mod tet_mesh;
 
 #[doc(hidden)]
-pub use adjacency::DisjointSets;
-#[doc(hidden)]
-pub use adjacency::neighbors;
-#[doc(hidden)]
-pub use adjacency::{FaceTable, boundary_faces, match_faces};
-#[doc(hidden)]
-pub use adjacency::{Topology, topology};
+pub use adjacency::{DisjointSets, FaceTable, Topology, boundary_faces, match_faces, neighbors, topology};
 #[doc(hidden)]
 pub use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 #[doc(hidden)]
-pub use check::check;
-#[doc(hidden)]
-pub use check::check_arrays;
-#[doc(hidden)]
-pub use check::check_topology;
+pub use check::{check, check_arrays, check_topology};
 pub use error::MeshError;
 pub use field::{Field, VectorPart};
 #[doc(hidden)]

@@ -66,9 +66,7 @@ pub use error::{MAX_QUARTERINGS, PageError};
 #[doc(hidden)]
 pub use exact::{Exact, ExactValues};
 #[doc(hidden)]
-pub use explicit::check::MtFault;
-#[doc(hidden)]
-pub use explicit::check::check_errors;
+pub use explicit::check::{MtFault, check_errors};
 pub use explicit::store::ExplicitMt;
 #[doc(hidden)]
 pub use explicit::store::ExplicitUpdate;
@@ -97,11 +95,9 @@ pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
 pub(crate) use pages::updates_of_page;
 pub(crate) use reaches::{Extent, Reaches};
-#[doc(hidden)]
-pub use replay::ReplayError;
 pub(crate) use replay::apply_next;
 #[doc(hidden)]
-pub use replay::canonical;
+pub use replay::{ReplayError, canonical};
 #[doc(hidden)]
 pub use stats::{MtStats, stats};
 pub use traits::{ApplyUpdates, MultiTessellation};

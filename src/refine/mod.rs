@@ -71,9 +71,7 @@ pub use criterion::{BlockData, Criterion, TetData, Verdict};
 #[doc(hidden)]
 pub use custom::Custom;
 #[doc(hidden)]
-pub use front::Front;
-#[doc(hidden)]
-pub use front::{GoOn, Outcome};
+pub use front::{Front, GoOn, Outcome};
 #[doc(hidden)]
 pub use lod_criterion::LodCriterion;
 pub use request::{Budget, Need, Part, Region, Request, RequestError, Transfer, Values, View};

@@ -103,13 +103,11 @@ impl Front {
                 demands.push(u128::from(page_of(absent)) << 64 | u128::from(verdict.excess.to_bits()));
             }
         };
-        if self.tracked {
-            self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
-        } else {
+        if !self.tracked {
             let slots = 0..self.mesh.tet_slots() as u32;
             slots.filter_map(|t| mt.awaited(&self.mesh, t).map(|u| (u, t))).for_each(|(u, t)| demand(u, t));
-            self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
         }
+        self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
         demands.sort_unstable();
         let largest = demands.chunk_by(|a, b| a >> 64 == b >> 64).filter_map(<[u128]>::last);
         largest.map(|&demand| ((demand >> 64) as u32, f64::from_bits(demand as u64))).collect()

@@ -58,9 +58,7 @@ pub use slice::{Plane, Slice};
 pub use solids::Solids;
 pub use stats::FieldStats;
 #[doc(hidden)]
-pub use stream::Tracer;
-#[doc(hidden)]
-pub use stream::{StreamEnd, StreamPoint};
+pub use stream::{StreamEnd, StreamPoint, Tracer};
 pub use stream::{Streamline, TraceOptions};
 #[doc(hidden)]
 pub use ticks::{Tick, end_ticks, linear_ticks, log_ticks};

@@ -21,7 +21,7 @@ fn clients_read_what_they_need() {
     let bytes = fs::read(&mt).expect("it is there");
     let server = Server::start(&[&mt]);
     // Small gaps, for the file is small.
-    let loader = LoaderOptions { gap: 64, ..LoaderOptions::default() };
+    let loader = LoaderOptions { gap: Some(64), ..LoaderOptions::default() };
     let source = HttpSource::new(&server.url, HttpOptions { loader, ..HttpOptions::default() });
     let mut client = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
     let mut whole = Session::new();

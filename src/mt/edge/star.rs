@@ -94,10 +94,6 @@ impl KindState for Ring {
     fn bytes(&self) -> u64 {
         size_of_val(self) as u64
     }
-
-    fn copy(&self) -> Box<dyn KindState> {
-        Box::new(self.clone())
-    }
 }
 
 impl Default for Ring {

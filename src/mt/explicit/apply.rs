@@ -257,10 +257,6 @@ impl ApplyUpdates for ExplicitMt {
         Ok(Applied::Done)
     }
 
-    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
-        [0; 3]
-    }
-
     fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         Self::slots(mesh, u.0, self.removed(u).iter().copied())
     }

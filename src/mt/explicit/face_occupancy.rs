@@ -64,10 +64,6 @@ impl KindState for FaceOccupancy {
         let faces = self.faces.0.capacity() * (size_of::<([u32; 3], [u8; 2])>() + 1);
         (faces + size_of_val(&self.around[..])) as u64
     }
-
-    fn copy(&self) -> Box<dyn KindState> {
-        Box::new(self.clone())
-    }
 }
 
 impl FaceOccupancy {

@@ -33,10 +33,6 @@ impl KindState for State {
         size_of_val(self) as u64 + self.known.bytes()
     }
 
-    fn copy(&self) -> Box<dyn KindState> {
-        Box::new(self.clone())
-    }
-
     fn is_of_updates(&self) -> bool {
         true
     }
@@ -531,11 +527,6 @@ impl ApplyUpdates for HalfEdgeMt {
             }
             Ok(Applied::Done)
         })
-    }
-
-    /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
-    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
-        [0; 3]
     }
 
     fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {

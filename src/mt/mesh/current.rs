@@ -18,16 +18,24 @@ use std::fmt;
 use std::ops::Range;
 
 /// What a kind of MT keeps with a mesh that its updates are applied to: scratch space, and memory of what was done.
-pub(in crate::mt) trait KindState: Any + Send + Sync {
+pub(in crate::mt) trait KindState: Any + Copied + Send + Sync {
     /// Bytes of it.
     fn bytes(&self) -> u64;
-
-    /// A copy, for a copy of the mesh.
-    fn copy(&self) -> Box<dyn KindState>;
 
     /// Whether it says nothing about the mesh, only about updates: then it holds when the mesh starts again.
     fn is_of_updates(&self) -> bool {
         false
+    }
+}
+
+/// A copy of a state, for a copy of the mesh.
+pub(in crate::mt) trait Copied {
+    fn copy(&self) -> Box<dyn KindState>;
+}
+
+impl<T: KindState + Clone> Copied for T {
+    fn copy(&self) -> Box<dyn KindState> {
+        Box::new(self.clone())
     }
 }
 

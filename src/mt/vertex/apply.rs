@@ -644,11 +644,6 @@ impl ApplyUpdates for VertexMt {
         })
     }
 
-    /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
-    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
-        [0; 3]
-    }
-
     fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         mesh.with_kind_state(|mesh, cavity| {
             let Applied::Done = self.gather_removed(mesh, u, self.shape(u).removed, cavity)? else {

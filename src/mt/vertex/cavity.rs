@@ -74,10 +74,6 @@ impl KindState for Cavity {
     fn bytes(&self) -> u64 {
         (size_of_val(self) + self.replaced.as_ref().map_or(0, PagedArray::bytes)) as u64
     }
-
-    fn copy(&self) -> Box<dyn KindState> {
-        Box::new(self.clone())
-    }
 }
 
 /// A hash of the tetrahedra that an insertion removed, which the mesh keeps with the vertex (its [`KindWord`](crate::mt::mesh::current::KindWord)). What the removal of the vertex puts

@@ -253,11 +253,6 @@ impl ApplyUpdates for VertexTreeMt {
         })
     }
 
-    /// All alike, as in [`VertexMt`](crate::mt::VertexMt).
-    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
-        [0; 3]
-    }
-
     fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         if self.missing_parent(mesh, u).is_some() {
             return Err(UpdateError::Error { update: u.0 });
