@@ -215,7 +215,7 @@ fn a_good_server_is_asked_for_little_more_than_is_wanted() {
     let server = works(FEW, good);
     let source = fetch_with(&server.url, options(), &WANTED).expect("it works");
     let wanted: u64 = WANTED.iter().map(|range| range.end.min(SIZE) - range.start).sum();
-    let traffic = source.traffic();
+    let traffic = source.traffic().expect("it is a network");
     assert_eq!(traffic.used, wanted);
     assert!(traffic.received <= wanted + 500, "{traffic:?}");
     assert_eq!((source.total(), source.serves_ranges()), (Some(SIZE), Some(true)));
@@ -516,7 +516,7 @@ fn what_was_fetched_once_is_kept_for_the_next_time() {
     let open = || fetch_with(&server.url, cached(), from_ref(&(0..10))).expect("it works");
     let fetched = |source: &mut HttpSource| {
         fetch_from(source, &WANTED).expect("it works");
-        source.traffic().received
+        source.traffic().expect("it is a network").received
     };
     assert!(fetched(&mut open()) > 100_000);
     assert_eq!(fetched(&mut open()), 10);
