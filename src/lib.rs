@@ -70,9 +70,8 @@
 //!
 //! Bytes become an MT in [`format`](mod@format), requests become a mesh in [`refine`], slices of the mesh become
 //! surfaces in [`view`]; [`session`] holds the three together and is what most programs want. [`mt`] is the structure
-//! itself, [`mesh`] and [`geom`] are what it rests on; [`stream`] brings byte ranges of files that are elsewhere, [`remote`] a session
-//! those that it needs, and [`client`] does so for native programs. `ARCHITECTURE.md` has the way of the data;
-//! [`format`](mod@format) shows the specification of the file.
+//! itself, [`mesh`] and [`geom`] are what it rests on; [`stream`] brings byte ranges of files that are elsewhere, and
+//! [`session::Client`] does so for native programs. `ARCHITECTURE.md` has the way of the data; [`format`](mod@format) shows the specification of the file.
 //!
 //! # What holds
 //!
