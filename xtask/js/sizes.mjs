@@ -25,7 +25,7 @@ const LIMITS = {
   "./build": 4_000,
   "./inline": 400_000,
   "./worker": 10_800,
-  "./viewer-worker": 19_600,
+  "./viewer-worker": 20_000,
   "./build-worker": 5_500,
   "./core.wasm": 290_000,
   "./viewer.wasm": 450_000,
