@@ -746,9 +746,7 @@ impl Loader {
     /// It grows backwards only by what comes within a wait: that comes before the most important bytes.
     fn grown(&self, start: u64, free: &RangeSet) -> Range<u64> {
         let Plan { gap, most, before } = self.pace.plan(&self.options, free, self.needed.len());
-        let is_bridged = |gap_between: Range<u64>| {
-            gap_between.end - gap_between.start <= gap && !self.is_busy(&gap_between)
-        };
+        let is_bridged = |between: Range<u64>| between.end - between.start <= gap && !self.is_busy(&between);
         let limit = start.saturating_add(most);
         let mut grown = start..start;
         while let Some(next) = free.first_in(&(grown.end..limit)) {

@@ -6,9 +6,9 @@ use crate::support::files::{
 };
 use crate::support::random::Random;
 use std::collections::BTreeSet;
-use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, FormatError, encode};
+use tetralod::format::{BlockInfo, DecodeOptions, Decoder, EncodeOptions, FormatError, encode};
 use tetralod::mt::{
-    Applied, ApplyUpdates, CurrentMesh, Mt, MultiTessellation, PageError, UpdateId, UpdatePages,
+    Applied, ApplyUpdates, CurrentMesh, ExplicitMt, Mt, MultiTessellation, PageError, UpdateId, UpdatePages,
 };
 
 /// A decoder of blocks: it has what comes before the first one.
@@ -29,7 +29,7 @@ fn block_bytes(decoder: &Decoder, bytes: &[u8], block: u32) -> Vec<u8> {
     ranges.iter().flat_map(|range| &bytes[range.start as usize..range.end as usize]).copied().collect()
 }
 
-/// Every tetrahedron that an update of a block removes or inserts lies within what the index tells of the block.
+/// Every tetrahedron that an update of a block, or one that depends on it, removes or inserts lies within what the index tells of the block.
 #[test]
 fn the_index_tells_the_truth() {
     for fields in [1, 3] {
@@ -39,25 +39,34 @@ fn the_index_tells_the_truth() {
         let index = decoder.index().expect("an index").clone();
         assert_eq!(index.blocks.len(), 19);
         let mt = decoder.mt().expect("a base mesh");
+        let explicit = ExplicitMt::of(mt).expect("a valid MT");
+        // The blocks of each update and of all that it depends on: all of them reach it.
+        let mut reached_from: Vec<BTreeSet<usize>> = Vec::new();
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.updates_arrived(&mut mesh, 0);
         for u in (0..mt.updates()).map(UpdateId) {
-            let info = &index.blocks[u.0 as usize >> 4];
-            let largest = (0..mt.info().fields.len()).all(|f| mt.error_of_field(u, f) <= info.errors[f]);
-            assert!(largest, "{u:?}");
-            let tets = mt.find_removed(&mut mesh, u).expect("a valid MT");
-            let inside = |mesh: &CurrentMesh, tets: &[u32]| {
-                tets.iter().filter_map(|&t| mesh.tet(t)).flatten().all(|v| {
+            let above = explicit.parents(u).iter().flat_map(|&p| reached_from[p as usize].clone());
+            let blocks: BTreeSet<usize> = above.chain([u.0 as usize >> 4]).collect();
+            let fit = |mesh: &CurrentMesh, tets: &[u32]| {
+                let fits = |info: &BlockInfo, v: u32| {
                     let p = mesh.positions()[v as usize];
                     let mut levels = mesh.levels(v).iter().zip(&info.ranges);
                     (0..3).all(|i| info.bounds[0][i] <= p[i] && p[i] <= info.bounds[1][i])
                         && levels.all(|(level, range)| range[0] <= *level && *level <= range[1])
-                })
+                };
+                let mut vertices = tets.iter().filter_map(|&t| mesh.tet(t)).flatten();
+                vertices.all(|v| blocks.iter().all(|&block| fits(&index.blocks[block], v)))
             };
-            assert!(inside(&mesh, &tets), "{u:?}");
+            for &block in &blocks {
+                let errors = &index.blocks[block].errors;
+                assert!((0..errors.len()).all(|f| mt.error_of_field(u, f) <= errors[f]), "{u:?}");
+            }
+            let tets = mt.find_removed(&mut mesh, u).expect("a valid MT");
+            assert!(fit(&mesh, &tets), "{u:?}");
             assert_eq!(mt.refine(&mut mesh, u), Ok(Applied::Done));
             let tets = mt.find_inserted(&mut mesh, u).expect("a valid MT");
-            assert!(inside(&mesh, &tets), "{u:?}");
+            assert!(fit(&mesh, &tets), "{u:?}");
+            reached_from.push(blocks);
         }
     }
 }
