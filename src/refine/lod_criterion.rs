@@ -175,8 +175,11 @@ impl Criterion for LodCriterion {
             let placed = self.frame.place(&corners);
             self.atoms.iter().any(|atom| atom.judge(&self.frame, &tet, &placed, false).violates())
         };
-        let custom: Option<Vec<bool>> = self.custom.iter().map(|custom| custom.may_need(block)).collect();
-        custom.map(|custom| custom.contains(&true) || block.tets().into_iter().any(asks))
+        let mut is_needed = block.tets().into_iter().any(asks);
+        for custom in &self.custom {
+            is_needed |= custom.may_need(block)?;
+        }
+        Some(is_needed)
     }
 
     fn is_batched(&self) -> bool {

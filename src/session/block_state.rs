@@ -37,7 +37,7 @@ pub(super) struct Blocks {
     /// The criterion of the request, and its budget.
     pub criterion: Option<Arc<dyn Criterion>>,
     pub budget: Budget,
-    /// Which blocks the request can need by what the index says that they reach, the largest errors first; none if its criterion cannot
+    /// Which blocks the request can need by what the index says that they reach, with their largest errors; none if its criterion cannot
     /// tell.
     pub reached: Option<Vec<(ErrorCode, u32)>>,
     /// Blocks that a mesh needed all the same.

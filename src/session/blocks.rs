@@ -314,17 +314,16 @@ impl Session {
     /// what the mesh asks for.
     fn plan_by_index(&self) -> Option<Vec<(f64, u32)>> {
         let (index, mt, blocks) = (self.decoder.index()?, self.decoder.mt()?, &self.blocks);
-        let affordable = updates_within(&blocks.budget, mt);
-        let mut updates = 0;
-        let is_affordable = |&&(_, block): &&(ErrorCode, u32)| {
-            updates += index.updates(block, mt.info().updates).len() as u64;
-            affordable.is_none_or(|most| updates <= most)
+        let reached = blocks.reached.as_ref()?;
+        let least = match updates_within(&blocks.budget, mt) {
+            Some(updates) => least_affordable(reached, updates, index, mt.info().updates),
+            None => ErrorCode::ZERO,
         };
-        let plan: Vec<(f64, u32)> = (blocks.reached.as_ref()?.iter().take_while(is_affordable))
-            .map(|&(error, block)| {
-                (priority(f64::INFINITY, &[error], index.blocks[block as usize].len()), block)
-            })
-            .collect();
+        let weighed = |&(error, block): &(ErrorCode, u32)| {
+            (priority(f64::INFINITY, &[error], index.blocks[block as usize].len()), block)
+        };
+        let plan: Vec<(f64, u32)> =
+            reached.iter().filter(|&&(error, _)| error >= least).map(weighed).collect();
         let bytes: u64 = plan.iter().map(|&(_, block)| mt.bytes_of_page(block)).sum();
         (bytes <= blocks.memory).then_some(plan)
     }
@@ -354,7 +353,9 @@ impl Session {
         }
         plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
         // The most important ones first; those as important as they are in the file.
-        plan.sort_by(|(priority, block), (other, after)| other.total_cmp(priority).then(block.cmp(after)));
+        plan.sort_unstable_by(|(priority, block), (other, after)| {
+            other.total_cmp(priority).then(block.cmp(after))
+        });
         blocks.needed = plan.len() as u32;
         // Pages with applied updates do not go: what comes has to fit beside them.
         let mut taken: u64 = (0..index.blocks.len() as u32)
@@ -465,7 +466,7 @@ fn priority(excess: f64, errors: &[ErrorCode], bytes: u64) -> f64 {
     gain / bytes as f64
 }
 
-/// Of a file with this index, the blocks that a criterion can need by what they reach, the largest errors first; none if it cannot tell.
+/// Of a file with this index, the blocks that a criterion can need by what they reach, with their largest errors; none if it cannot tell.
 fn reached(
     criterion: &dyn Criterion,
     index: &Index,
@@ -482,8 +483,22 @@ fn reached(
             needed.push((errors.into_iter().max().unwrap_or(ErrorCode::ZERO), block));
         }
     }
-    needed.sort_by(|(error, block), (other, after)| other.cmp(error).then(block.cmp(after)));
     Some(needed)
+}
+
+/// The least error above which blocks have no more than so many of the updates of an MT.
+fn least_affordable(reached: &[(ErrorCode, u32)], most: u64, index: &Index, updates: u32) -> ErrorCode {
+    // In the index, errors have eight bits.
+    let mut updates_of = [0_u64; 256];
+    for &(error, block) in reached {
+        updates_of[usize::from(error.0 >> 8)] += index.updates(block, updates).len() as u64;
+    }
+    let mut sum = 0;
+    let affordable = (0..256).rev().take_while(|&byte| {
+        sum += updates_of[byte];
+        sum <= most
+    });
+    affordable.last().map_or(ErrorCode::MAX, |byte| ErrorCode((byte as u16) << 8))
 }
 
 /// About twice as many updates as a budget has room for: of the blocks with the largest errors, not all are applied.
