@@ -37,7 +37,7 @@ export interface RangesOptions {
   cache?: string;
   /** At a time; 6. */
   maxRequests?: number;
-  /** Ranges closer than so many bytes are fetched as one; 16384. */
+  /** Ranges closer than so many bytes are fetched as one; by default what suits the network. */
   gap?: number;
   /** 4 MiB. */
   maxRequestBytes?: number;
