@@ -5,22 +5,23 @@
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// The number of the thread that asks, 0 outside of the pool, and how many there are.
+fn place() -> [usize; 2] {
+    #[cfg(feature = "parallel")]
+    let place = [rayon::current_thread_index().unwrap_or(0), rayon::current_num_threads()];
+    #[cfg(not(feature = "parallel"))]
+    let place = [0, 1];
+    place
+}
+
 /// How many threads there are.
 pub fn count() -> usize {
-    #[cfg(feature = "parallel")]
-    let count = rayon::current_num_threads();
-    #[cfg(not(feature = "parallel"))]
-    let count = 1;
-    count
+    place()[1]
 }
 
 /// The number of the thread that asks, below [`count`]; 0 outside of the pool.
 pub fn own() -> usize {
-    #[cfg(feature = "parallel")]
-    let own = rayon::current_thread_index().unwrap_or(0);
-    #[cfg(not(feature = "parallel"))]
-    let own = 0;
-    own
+    place()[0]
 }
 
 /// What `find` makes of each range of `share` items, the last of which may be shorter, in their order.
