@@ -185,6 +185,7 @@ export const blocks: Members<BlockProgress> = {
   needed: "number",
   leftOut: "number",
   bytes: "number",
+  missed: "number",
 };
 
 /** A result has the members of its type, of these kinds, and no others. */
