@@ -325,7 +325,7 @@ export interface RefineStats extends CoreStats {
 export interface BlockMap {
   /**
    * Six numbers for each block, in model units: the lower and the upper corner of a box that holds all tetrahedra that the
-   * block changes. Boxes overlap; those of the first blocks, which are the coarsest, are as large as the volume.
+   * block, or what depends on it, changes. Boxes overlap; those of the first blocks, which are the coarsest, are as large as the volume.
    */
   bounds: Float64Array;
   /** For each block 0: not fetched, 1: fetched, 2: fetched, and the current mesh uses it. */

@@ -143,9 +143,9 @@ function showBlocks() {
 function showTraffic() {
   const rows = [
     ["Bytes received", size(demo.receivedBytes)],
+    ["Of these needed", size(traffic?.used ?? demo.receivedBytes)],
     ["Requests", traffic ? `${count(traffic.requests)} in ${count(traffic.rounds)} rounds` : "1"],
     ["Waited for them", traffic ? milliseconds(traffic.waitedMs) : "–"],
-    ["Of these needed", size(traffic?.used ?? demo.receivedBytes)],
     ["Memory of blocks", demo.blocks ? size(demo.blocks.bytes) : "–"],
     ["Memory on the GPU", size(gpuBytes)],
     ["Uploaded to the GPU", size(uploaded)],

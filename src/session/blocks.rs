@@ -34,7 +34,7 @@ pub struct BlockProgress {
 /// A block of the file, in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MappedBlock {
-    /// A box, in units of the model, that holds all tetrahedra that its updates remove or insert.
+    /// A box, in units of the model, that holds all tetrahedra that its updates, and all that depend on them, remove or insert.
     pub bounds: Bounds,
     /// Whether it is here.
     pub state: BlockState,
