@@ -299,12 +299,12 @@ impl Session {
 
     /// Notes the criterion and the budget of a new request, and works out which blocks it needs as far as the index tells.
     pub(super) fn new_request(&mut self, criterion: Arc<dyn Criterion>, budget: Budget) {
-        let fields = self.decoder.wanted_fields();
-        let described = self.decoder.index().zip(self.decoder.info());
-        let reached = described.and_then(|(index, info)| reached(&*criterion, index, info, fields));
         let blocks = &mut self.blocks;
-        (blocks.reached, blocks.criterion, blocks.budget) = (reached, Some(criterion), budget);
-        if blocks.in_parts && self.plan_by_index().is_some() {
+        if blocks.in_parts {
+            let fields = self.decoder.wanted_fields();
+            let described = self.decoder.index().zip(self.decoder.info());
+            blocks.reached = described.and_then(|(index, info)| reached(&*criterion, index, info, fields));
+            (blocks.criterion, blocks.budget) = (Some(criterion), budget);
             self.plan(false);
         }
     }
@@ -328,9 +328,13 @@ impl Session {
         (bytes <= blocks.memory).then_some(plan)
     }
 
-    /// Works out which blocks the request needs; by the mesh, too, if that was made for the request.
+    /// Works out which blocks the request needs; by the mesh, too, if that was made for the request. Where the index does not tell, the plan
+    /// stays as it is until then.
     fn plan(&mut self, mesh_has_moved: bool) {
         let by_index = self.plan_by_index();
+        if by_index.is_none() && !mesh_has_moved {
+            return;
+        }
         let (blocks, Some(index), Some(mt)) = (&mut self.blocks, self.decoder.index(), self.decoder.mt())
         else {
             return;

@@ -391,8 +391,8 @@ impl Loader {
         request.body.start += taken as u64;
         let chunk = start..request.body.start;
         let done = request.body.start == request.body.end;
-        self.traffic.repeated += taken as u64 - self.unseen(&chunk).len();
-        let used = self.store(&chunk, &bytes[..taken]);
+        let [used, new] = self.store(&chunk, &bytes[..taken]);
+        self.traffic.repeated += taken as u64 - new;
         self.requests[at].used += used;
         self.traffic.used += used;
         if done {
@@ -544,10 +544,12 @@ impl Loader {
         RangeSet::of(self.wanted.iter().map(|wanted| self.file.clip(&wanted.range)).collect())
     }
 
-    /// Keeps of `chunk` what is wanted and not held, and what has not come before; says how much was wanted.
-    fn store(&mut self, chunk: &Range<u64>, bytes: &[u8]) -> u64 {
-        let mut new = self.unseen(chunk);
+    /// Keeps of `chunk` what is wanted and not held, and what has not come before; says how much was wanted, and how much had not come.
+    fn store(&mut self, chunk: &Range<u64>, bytes: &[u8]) -> [u64; 2] {
+        let mut new = RangeSet::of(vec![chunk.clone()]);
+        self.came.iter().for_each(|range| new.remove(range));
         self.came.insert(chunk);
+        let unseen = new.len();
         // The whole file is not kept by the way.
         if self.ranges == Some(false) {
             new = RangeSet::default();
@@ -564,14 +566,7 @@ impl Loader {
             self.reassembly.put(part.start, &bytes[place(part.start)..place(part.end)]);
         }
         self.drop_spare();
-        used
-    }
-
-    /// What of a chunk has not come before.
-    fn unseen(&self, chunk: &Range<u64>) -> RangeSet {
-        let mut new = RangeSet::of(vec![chunk.clone()]);
-        self.came.iter().for_each(|range| new.remove(range));
-        new
+        [used, unseen]
     }
 
     /// Drops bytes that are not wanted, if there are too many.
