@@ -328,7 +328,7 @@ pub fn repaired(file: &[u8]) -> Vec<u8> {
         sections += 1;
         at = payload + length;
     }
-    bytes[..10].copy_from_slice(b"\x89TLOD\r\n\x1a\x01\x00");
+    bytes[..10].copy_from_slice(b"\x89TLOD\r\n\x1a\x02\x00");
     bytes[12..16].fill(0);
     let total = bytes.len() as u64;
     bytes[16..24].copy_from_slice(&total.to_le_bytes());

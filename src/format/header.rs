@@ -5,7 +5,7 @@ use super::{FormatError, checksum};
 /// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
 pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
 /// The version of the format: the only one that is written and read.
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 /// Bytes of the file header.
 pub const HEADER_BYTES: usize = 32;
 /// Bytes of a section's head.

@@ -297,7 +297,7 @@ proptest! {
         let mut decoder = Decoder::default();
         let fed = decoder.feed(&noise);
         prop_assert!(fed.is_err() || noise.len() < 8);
-        let body = [header(1, 0, 0), noise].concat();
+        let body = [header(2, 0, 0), noise].concat();
         prop_assert!(decode(&body).is_err());
     }
 }

@@ -54,17 +54,17 @@ fn versions_and_flags() {
     let bytes = bytes_of(&sample(1, 20));
     let with = |head: Vec<u8>| decode(&[&head, &bytes[32..]].concat());
     let total = bytes.len() as u64;
-    assert!(with(header(1, 0, total)).is_ok());
-    assert!(with(header(1, 0, 0)).is_ok(), "a writer need not know the size");
-    assert!(with(header(1, 1 << 16, total)).is_ok(), "a hint");
-    for found in [0, 2, 3, 257, u16::MAX] {
-        let other = FormatError::UnsupportedVersion { found, supported: 1 };
+    assert!(with(header(2, 0, total)).is_ok());
+    assert!(with(header(2, 0, 0)).is_ok(), "a writer need not know the size");
+    assert!(with(header(2, 1 << 16, total)).is_ok(), "a hint");
+    for found in [0, 1, 3, 257, u16::MAX] {
+        let other = FormatError::UnsupportedVersion { found, supported: 2 };
         assert_eq!(with(header(found, 0, total)), Err(other));
     }
-    let critical = with(header(1, 1 << 15, total));
+    let critical = with(header(2, 1 << 15, total));
     assert!(matches!(critical, Err(FormatError::UnsupportedFeature { offset: 12, .. })));
     for wrong in [total - 1, total + 1, 33] {
-        let found = with(header(1, 0, wrong));
+        let found = with(header(2, 0, wrong));
         assert!(matches!(found, Err(FormatError::Corrupt { .. })), "{wrong} of {total} bytes");
     }
 }
@@ -88,7 +88,7 @@ fn other_files_are_called_so_at_once() {
 fn every_error_says_what_to_do() {
     let errors = [
         FormatError::NotMt,
-        FormatError::UnsupportedVersion { found: 99, supported: 1 },
+        FormatError::UnsupportedVersion { found: 99, supported: 2 },
         FormatError::UnsupportedFeature { offset: 12, what: "a flag" },
         FormatError::Corrupt { offset: 99, what: "a number" },
         FormatError::Truncated { offset: 99 },

@@ -339,5 +339,5 @@ pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
     end.extend((framed.len() as u32).to_le_bytes());
     end.extend(crc32(&[&crcs]).to_le_bytes());
     let body = [framed.concat(), section(b"ENDF", &end)].concat();
-    [header(1, 0, 32 + body.len() as u64), body].concat()
+    [header(2, 0, 32 + body.len() as u64), body].concat()
 }

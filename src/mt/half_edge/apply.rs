@@ -3,7 +3,8 @@
 //! In the current mesh the tag of a tetrahedron is the update that removes it, and its inner faces are those that go with
 //! it. Insertion keeps the slots of T_u, removal those of the star without the near vertex.
 
-use super::scratch::{MOST, NEW, NO_ENTRY, NewTet, Scratch};
+use super::new_star::{MOST, NEW};
+use super::scratch::Scratch;
 use super::star_code::{KnownStars, StarCode};
 use super::store::HalfEdgeMt;
 use crate::geom::orient3d;
@@ -118,50 +119,9 @@ impl HalfEdgeMt {
         }
         let scratch = &mut state.scratch;
         self.collect_removed(&mut other, u, Search::Nearby, scratch)?;
-        let removed = &scratch.removed[..scratch.removed_len];
+        let removed = &scratch.slots[..scratch.removed_len];
         let mut parents = removed.iter().filter_map(|&t| self.creator(&other, t));
         parents.find(|&p| mesh.slot(self.vertex(p)).is_none()).ok_or(torn)
-    }
-
-    /// Finds the star that the insertion makes, whose T_u has been collected; drawn at [`super::scratch`]. None if T_u is not what an
-    /// insertion removes.
-    pub(super) fn find_star(&self, mesh: &mut CurrentMesh, scratch: &mut Scratch) -> Option<()> {
-        let slot = scratch.link[0];
-        mesh.number_slot(slot, 0);
-        scratch.link_len = 1;
-        scratch.ends.clear();
-        let moved = scratch.removed_len;
-        scratch.star_len = moved;
-        for i in 0..moved {
-            let t = scratch.removed[i];
-            let (tet, around, inner) = (mesh.tets[t as usize], mesh.neighbors[t as usize], mesh.tet_byte(t));
-            let mut corners = [0; 4];
-            for (corner, &v) in corners.iter_mut().zip(&tet) {
-                *corner = scratch.number(mesh, v)?;
-            }
-            let at = corner_of(&tet, slot);
-            let mut new =
-                NewTet { corners, own: at as u8, beyond: around[at], source: t, ..NewTet::default() };
-            new.corners[at] = NEW;
-            new.across = [NO_ENTRY; 4];
-            for face in (0..4).filter(|&face| face != at) {
-                let n = around[face];
-                let behind = if n == NONE { None } else { mesh.tet_number(n) };
-                if inner >> face & 1 == 1 {
-                    if n != NONE {
-                        new.across[face] = behind? as u8;
-                    }
-                    continue;
-                }
-                // A face that stays must not have tetrahedra of T_u on both sides.
-                if behind.is_some() {
-                    return None;
-                }
-                new.across[face] = scratch.add_gap(i as u8, &corners, [at, face], n, t)?;
-            }
-            scratch.star[i] = new;
-        }
-        scratch.close_ring()
     }
 
     /// Positions and levels of the new vertex.
@@ -174,7 +134,7 @@ impl HalfEdgeMt {
         let offset = children[at].offset;
         let position = [0, 1, 2].map(|k| centre[k].saturating_add(offset[k]));
         let residuals = self.update(u).ok_or(UpdateError::Missing { update: u.0 })?.level_residuals;
-        scratch.predict_levels(mesh, position);
+        scratch.place(mesh, position);
         for (level, residual) in scratch.levels.iter_mut().zip(residuals) {
             *level = level.saturating_add(*residual);
         }
@@ -193,10 +153,10 @@ impl HalfEdgeMt {
         if let Applied::Blocked(before) = self.collect_removed(mesh, u, search, scratch)? {
             return Ok(Err(before));
         }
-        self.find_star(mesh, scratch).ok_or(UpdateError::Cavity { update: u.0 })?;
+        scratch.find_star(mesh).ok_or(UpdateError::Cavity { update: u.0 })?;
         let position = self.place_vertex(mesh, u, scratch)?;
         if !mesh.is_proven(u.0) {
-            if !scratch.is_positive(mesh, position) {
+            if !scratch.places.is_positive(&scratch.star[..scratch.star_len]) {
                 return Err(UpdateError::Inverted { update: u.0 });
             }
             mesh.set_proven(u.0);
@@ -217,12 +177,8 @@ impl HalfEdgeMt {
             Err(before) => return Ok(Applied::Blocked(before)),
         };
         scratch.hash_star(mesh, self.vertex(u).0);
-        scratch.sort_star();
-        let found = if known.recall(u.0, scratch) {
-            Some(())
-        } else {
-            self.find_removers(mesh, u, position, scratch, code).inspect(|()| known.keep(u.0, scratch))
-        };
+        let found =
+            if known.recall(u.0, scratch) { Some(()) } else { self.find_removers(mesh, u, scratch, code) };
         found.ok_or(UpdateError::Mask { update: u.0 })?;
         self.perform_insertion(mesh, u, position, scratch);
         Ok(Applied::Done)
@@ -239,18 +195,16 @@ impl HalfEdgeMt {
         mesh.put_vertex(slot, Labels { vertex: self.vertex(u).0, kind_word: KindWord::NONE }, position);
         let first = slot as usize * mesh.fields;
         mesh.levels[first..first + scratch.levels.len()].copy_from_slice(&scratch.levels);
-        let (moved, all) = (scratch.removed_len, scratch.star_len);
-        let mut slots = [NONE; MOST];
-        slots[..moved].copy_from_slice(&scratch.removed[..moved]);
+        let Scratch { slots, removed_len: moved, star, star_len: all, link, .. } = scratch;
+        let (moved, all) = (*moved, *all);
         mesh.new_tets(&mut slots[moved..all]);
-        let near = scratch.link[0];
-        let slot_of = |entry: u8| if entry == NO_ENTRY { NONE } else { slots[entry as usize % MOST] };
-        for (i, new) in scratch.star[..all].iter().enumerate() {
+        link[usize::from(NEW)] = slot;
+        mesh.forget_place(u.0);
+        for (i, new) in star[..all].iter().enumerate() {
             let t = slots[i];
-            let own = new.own as usize & 3;
-            let tet = new.corners.map(|x| if x == NEW { slot } else { scratch.link[x as usize % MOST] });
-            let mut around = new.across.map(slot_of);
-            around[own] = new.beyond;
+            let tet = new.corners.map(|corner| link[usize::from(corner)]);
+            let mut around = new.across.map(|n| slots[usize::from(n)]);
+            around[usize::from(new.own) & 3] = new.beyond;
             mesh.tets[t as usize] = tet;
             mesh.neighbors[t as usize] = around;
             if i >= moved {
@@ -259,12 +213,12 @@ impl HalfEdgeMt {
                 }
                 tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
             }
-            mesh.set_tag(t, new.remover);
+            mesh.set_new_tag(t, new.remover);
             mesh.set_tet_byte(t, new.inner);
             mesh.mark_tet(t);
         }
         mesh.incident[slot as usize] = slots[0];
-        mesh.incident[near as usize] = slots[moved];
+        mesh.incident[link[0] as usize] = slots[moved];
         mesh.touch(&slots[..all]);
     }
 
@@ -291,12 +245,18 @@ impl HalfEdgeMt {
         Ok(Ok([slot, near]))
     }
 
-    fn remove(&self, mesh: &mut CurrentMesh, u: UpdateId, scratch: &mut Scratch) -> Result<Applied> {
+    fn remove(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        State { scratch, known, .. }: &mut State,
+    ) -> Result<Applied> {
         let star = &mut scratch.gathered;
         let [slot, near] = match self.collect_inserted(mesh, u, star)? {
             Ok(slots) => slots,
             Err(child) => return Ok(Applied::Blocked(child)),
         };
+        known.keep(u.0, &star.tets[..star.len], mesh);
         let (mut gone, mut gone_len) = ([NONE; MOST], 0);
         for (&t, &at) in star.tets[..star.len].iter().zip(&star.corner) {
             let (mut tet, mut around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
@@ -349,19 +309,20 @@ impl CurrentMesh {
         let torn = || UpdateError::Cavity { update };
         self.next_epoch();
         self.number_tet(first, 0);
-        scratch.removed[0] = first;
+        scratch.slots[0] = first;
         let (mut next, mut len) = (0, 1);
         while next < len {
-            let t = scratch.removed[next];
+            let t = scratch.slots[next % MOST];
             let (tet, around, inner) = (self.tets[t as usize], self.neighbors[t as usize], self.tet_byte(t));
             let at = corner_of(&tet, slot);
             if tet[at] != slot {
                 return Err(torn());
             }
-            for (face, &n) in around.iter().enumerate() {
-                if face == at || inner >> face & 1 == 0 || n == NONE {
-                    continue;
-                }
+            let inner = inner & !(1 << at);
+            for (face, n) in around.into_iter().enumerate() {
+                // What goes and what is new is a coin toss for the processor: where nothing is to be done, it is done for `t` again.
+                let goes = u32::from(inner >> face & 1 == 1 && n != NONE).wrapping_neg();
+                let n = n & goes | t & !goes;
                 let tag = self.tag(n);
                 if tag != update {
                     if tag >= update {
@@ -370,13 +331,12 @@ impl CurrentMesh {
                     self.place_tag(n);
                     return Ok(Applied::Blocked(UpdateId(tag)));
                 }
-                if len == MOST {
+                let is_new = self.number_tet(n, len as u32 % MOST as u32).is_none();
+                if len == MOST && is_new {
                     return Err(torn());
                 }
-                if self.number_tet(n, len as u32).is_none() {
-                    scratch.removed[len] = n;
-                    len += 1;
-                }
+                scratch.slots[len % MOST] = if len == MOST { first } else { n };
+                len += usize::from(is_new);
             }
             next += 1;
         }
@@ -508,7 +468,7 @@ impl ApplyUpdates for HalfEdgeMt {
     }
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied> {
-        mesh.with_kind_state(|mesh, State { scratch, .. }| self.remove(mesh, u, scratch))
+        mesh.with_kind_state(|mesh, state| self.remove(mesh, u, state))
     }
 
     fn look_at_removed(&self, mesh: &mut CurrentMesh, u: UpdateId, look: LookAtTet<'_>) -> Result<Applied> {
@@ -532,7 +492,7 @@ impl ApplyUpdates for HalfEdgeMt {
     fn find_removed(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Vec<u32>> {
         mesh.with_kind_state(|mesh, State { scratch, .. }| {
             match self.collect_removed(mesh, u, Search::Everywhere, scratch)? {
-                Applied::Done => Ok(scratch.removed[..scratch.removed_len].to_vec()),
+                Applied::Done => Ok(scratch.slots[..scratch.removed_len].to_vec()),
                 Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
             }
         })

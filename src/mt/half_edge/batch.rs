@@ -2,9 +2,11 @@
 //! then the stars are coded, each by itself.
 
 use super::forest::Forest;
+use super::new_star::{NEW, NewTet};
+use super::places::Places;
 use super::refusal::{damaged, refused};
 use super::removers::{Remover, set_removers};
-use super::scratch::{NEW, NewTet, Scratch, is_positive, predict_levels};
+use super::scratch::Scratch;
 use super::star_code::StarCode;
 use super::store::{HalfEdgeMt, HalfEdgeUpdate};
 use crate::mt::facts::MtFacts;
@@ -71,6 +73,7 @@ struct Coded {
 #[derive(Default)]
 struct CodeScratch {
     code: StarCode,
+    places: Places,
     star: Vec<NewTet>,
     parents: Vec<UpdateId>,
     beyond: Vec<i32>,
@@ -98,18 +101,20 @@ impl Coded {
         at: usize,
         star: &TakenStar<'_>,
         forest: &Forest,
-        CodeScratch { code, star: tets, parents, .. }: &mut CodeScratch,
+        CodeScratch { code, places, star: tets, parents, .. }: &mut CodeScratch,
     ) -> Result<(), ConvertError> {
         let update = star.update.0;
-        if !is_positive(star.tets, star.positions(), star.position) {
+        places.set(star.link.iter().map(|v| v.1), star.position);
+        if !places.is_positive(star.tets) {
             return Err(damaged(UpdateError::Inverted { update }));
         }
         let fields = star.levels.len();
-        star.put_residuals(&mut self.residuals[at * fields..][..fields]);
+        star.put_residuals(places, &mut self.residuals[at * fields..][..fields]);
         tets.clear();
         tets.extend_from_slice(star.tets);
-        let vertices = star.vertices().map(|(label, p)| (label, p, forest.children(label)));
-        code.write(star.update, tets, vertices, &mut self.stars).ok_or_else(|| refused(update))?;
+        let (labels, children) = (star.link.iter().map(|v| v.0), |label| forest.children(label));
+        code.write((star.update, star.vertex), tets, labels, places, children, &mut self.stars)
+            .ok_or_else(|| refused(update))?;
         self.ends.push(self.stars.len());
         self.bounds.push(star.bounds());
         self.ranges.extend(star.ranges());
@@ -143,16 +148,6 @@ impl<'a> TakenStar<'a> {
         &self.link_levels[v * fields..][..fields]
     }
 
-    /// Where the vertices of the link are.
-    fn positions(&self) -> impl Iterator<Item = [i32; 3]> + Clone + 'a {
-        self.link.iter().map(|v| v.1)
-    }
-
-    /// The labels of the vertices of the link and of the new one, which comes last, and where these are.
-    fn vertices(&self) -> impl Iterator<Item = (u32, [i32; 3])> + Clone + 'a {
-        self.link.iter().copied().chain([(self.vertex, self.position)])
-    }
-
     /// What created each tetrahedron that the update has removed, and the levels at its corners: those of the one that took its slot, with
     /// the near vertex in place of the new one.
     fn removed(&self, mt: &HalfEdgeMt) -> impl Iterator<Item = (Option<UpdateId>, [&'a [i32]; 4])> + Clone {
@@ -164,15 +159,14 @@ impl<'a> TakenStar<'a> {
     }
 
     /// Writes, field by field, what is to be added to the predicted level of the new vertex.
-    fn put_residuals(&self, residuals: &mut [i32]) {
-        let link = self.positions().enumerate().map(|(v, p)| (p, self.levels_at(v)));
-        predict_levels(link, self.position, residuals);
+    fn put_residuals(&self, places: &Places, residuals: &mut [i32]) {
+        places.predict_levels(|v| self.levels_at(v), residuals);
         residuals.iter_mut().zip(self.levels).for_each(|(residual, level)| *residual = level - *residual);
     }
 
     /// The box around the star.
     fn bounds(&self) -> [[i32; 3]; 2] {
-        self.vertices().fold([[i32::MAX; 3], [i32::MIN; 3]], |[low, high], (_, p)| {
+        self.link.iter().fold([self.position; 2], |[low, high], (_, p)| {
             [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
         })
     }
@@ -270,7 +264,7 @@ impl Batch {
             Applied::Done => {}
             Applied::Blocked(_) => return Err(refused()),
         }
-        mt.find_star(mesh, scratch).ok_or_else(refused)?;
+        scratch.find_star(mesh).ok_or_else(refused)?;
         let offset = forest.offset(update, near).ok_or_else(refused)?;
         let position = [0, 1, 2].map(|k| mesh.positions[slot as usize][k].saturating_add(offset[k]));
         let levels = self.levels_of(i, mesh.fields);

@@ -1,6 +1,7 @@
 //! What removes the tetrahedra of a star, and which of their faces go with them, from an order of faces to the corners of the star.
 
-use super::scratch::{MOST, NEW, Scratch};
+use super::new_star::{MOST, NEW};
+use super::scratch::Scratch;
 use crate::mt::{CurrentMesh, VertexId};
 
 /// What removes a tetrahedron, [`NONE`](crate::mesh::NONE) if nothing does, and which of its faces go with it (see [`BaseMark`](super::store::BaseMark)): bit `i` is

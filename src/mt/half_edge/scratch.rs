@@ -16,134 +16,137 @@
 //! ```
 //!
 //! What must hold: no face that stays has tetrahedra of T_u on both sides; the gaps lie around the edge n v in one piece
-//! ([`Scratch::close_ring`]); and all tetrahedra of the star are positive ([`Scratch::is_positive`]). The removal of v undoes this: what
+//! ([`Scratch::find_star`]); and all tetrahedra of the star are positive ([`Places::is_positive`]). The removal of v undoes this: what
 //! has v and n goes, what has v alone gets n in its place.
 
-use crate::geom::{NARROW_BITS, det_i64, orient3d};
-use crate::mesh::FACES;
+use super::new_star::{ByCorner, MOST, NEW, NO_ENTRY, NewTet};
+use super::places::Places;
+use crate::mesh::NONE;
 use crate::mt::CurrentMesh;
-use crate::mt::mesh::stars::{GATHERED, Star};
-
-/// Most tetrahedra of a star, and most vertices of its link.
-pub(in crate::mt) const MOST: usize = GATHERED;
-
-/// Stands for the new vertex among the corners of a [`NewTet`].
-pub(in crate::mt) const NEW: u8 = 0xFF;
-
-/// No tetrahedron of the new star.
-pub(in crate::mt) const NO_ENTRY: u8 = 0xFF;
-
-/// A tetrahedron of the star that an insertion makes.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::mt) struct NewTet {
-    /// The corners by index into the link, [`NEW`] for the new vertex; positive.
-    pub corners: [u8; 4],
-    /// Across each face that has the new vertex, the tetrahedron of the star, [`NO_ENTRY`] at the boundary.
-    pub across: [u8; 4],
-    /// Which corner is the new vertex.
-    pub own: u8,
-    /// What lies across the face opposite the new vertex.
-    pub beyond: u32,
-    /// The slot of T_u that it takes, or along whose face it fills the gap.
-    pub source: u32,
-    /// The update that removes it.
-    pub remover: u32,
-    /// Which faces go with it.
-    pub inner: u8,
-}
+use crate::mt::mesh::stars::Star;
+use crate::mt::mesh::tet::{TURN, corner_of};
+use arrayvec::ArrayVec;
 
 /// Scratch space for insertions and removals.
 #[derive(Clone, Debug)]
 pub(in crate::mt) struct Scratch {
-    /// T_u.
-    pub removed: [u32; MOST],
+    /// The slots of the tetrahedra of the star: first those of T_u, then, once they are needed, those of what fills the gaps. That of
+    /// [`NO_ENTRY`] is [`NONE`].
+    pub slots: ByCorner<u32>,
+    /// How many tetrahedra T_u has.
     pub removed_len: usize,
     /// The star: first what takes the slots of T_u in its order, then what fills the gaps.
     pub star: [NewTet; MOST],
     pub star_len: usize,
-    /// Slots of the vertices of Π_u; the near vertex is the first.
-    pub link: [u32; MOST],
+    /// Slots of the vertices of Π_u; the near vertex is the first. That of the new vertex is set when it is inserted.
+    pub link: ByCorner<u32>,
     pub link_len: usize,
-    /// Around the edge from the near to the new vertex: a link vertex, a gap, and the corner of that opposite the face
-    /// which has the vertex.
-    pub ends: Vec<u32>,
+    /// The faces of T_u that have the near vertex and stay: a tetrahedron of the star, and the face.
+    gaps: ArrayVec<[u8; 2], { 3 * MOST }>,
+    /// For each vertex of the link: which gap has a face with it and the edge from the near to the new vertex, and the corner of
+    /// the gap opposite this face; once two have, [`JOINED`].
+    ends: ByCorner<[u8; 2]>,
     pub levels: Vec<i32>,
     pub gathered: Star,
-    /// A hash of the label of each vertex of the link; then that of the new vertex.
-    pub hashes: Vec<u64>,
-    /// For each tetrahedron of the star, the sum of those of its corners.
-    pub tet_hashes: Vec<u64>,
-    /// The star in canonical order: hashes whose lowest bits are replaced by the place in the star.
-    pub sorted: Vec<u64>,
+    pub places: Places,
+    pub hashes: Hashes,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
         Self {
-            removed: [0; MOST],
+            slots: [NONE; _],
             removed_len: 0,
             star: [NewTet::default(); MOST],
             star_len: 0,
-            link: [0; MOST],
+            link: [0; _],
             link_len: 0,
-            ends: Vec::new(),
+            gaps: ArrayVec::new(),
+            ends: [NO_END; _],
             levels: Vec::new(),
             gathered: Star::default(),
-            hashes: Vec::new(),
-            tet_hashes: Vec::new(),
-            sorted: Vec::new(),
+            places: Places::default(),
+            hashes: Hashes::default(),
         }
     }
 }
 
+/// No gap has a face at the vertex yet.
+const NO_END: [u8; 2] = [NO_ENTRY, 0];
+/// Two gaps meet in the face at the vertex.
+const JOINED: [u8; 2] = [NO_ENTRY, 1];
+
 impl Scratch {
-    /// The index of a vertex in the link, where it is put if it is new.
-    #[inline]
-    pub fn number(&mut self, mesh: &mut CurrentMesh, v: u32) -> Option<u8> {
-        let next = self.link_len;
-        if let Some(known) = mesh.number_slot(v, next as u32) {
-            return Some(known as u8);
+    /// Finds the star that the insertion makes, whose T_u has been collected. None if T_u is not what an insertion removes.
+    pub fn find_star(&mut self, mesh: &mut CurrentMesh) -> Option<()> {
+        let near = self.link[0];
+        mesh.number_slot(near, 0);
+        self.link_len = 1;
+        self.gaps.clear();
+        for i in 0..self.removed_len {
+            let t = self.slots[i];
+            let (tet, around, inner) = (mesh.tets[t as usize], mesh.neighbors[t as usize], mesh.tet_byte(t));
+            let mut corners = self.number(mesh, tet)?;
+            let at = corner_of(&tet, near);
+            corners[at] = NEW;
+            // What lies behind a face and has a number is of T_u.
+            let mut across = around.map(|n| mesh.tet_number(n).map_or(NO_ENTRY, |number| number as u8));
+            let (mut known, mut there) = (0, 0);
+            for face in 0..4 {
+                known |= u8::from(across[face] != NO_ENTRY) << face;
+                there |= u8::from(around[face] != NONE) << face;
+            }
+            let at_near = !(1 << at) & 15;
+            // A face that stays must not have tetrahedra of T_u on both sides; one that goes must, or be of the boundary.
+            if (known ^ inner) & there & at_near != 0 {
+                return None;
+            }
+            across[at] = NO_ENTRY;
+            self.star[i] = NewTet {
+                corners,
+                across,
+                own: at as u8,
+                beyond: around[at],
+                source: t,
+                remover: NONE,
+                inner: 0,
+            };
+            let mut stay = !inner & at_near;
+            while stay != 0 {
+                self.gaps.push([i as u8, stay.trailing_zeros() as u8]);
+                stay &= stay - 1;
+            }
         }
-        // One less than all numbers, so that a mark never overflows.
-        *self.link.get_mut(next).filter(|_| next + 1 < MOST)? = v;
-        self.link_len += 1;
-        Some(next as u8)
+        self.fill_gaps(mesh)
     }
 
-    /// Adds the tetrahedron that fills the gap behind a face of tetrahedron `t` of T_u, whose corner `at` is the near vertex.
+    /// The indices of the corners of a tetrahedron in the link, where they are put if they are new; none if there are too many.
     #[inline]
-    pub fn add_gap(
-        &mut self,
-        of: u8,
-        corners: &[u8; 4],
-        [at, face]: [usize; 2],
-        beyond: u32,
-        t: u32,
-    ) -> Option<u8> {
-        let place = self.star_len;
-        if place == MOST {
-            return None;
+    fn number(&mut self, mesh: &mut CurrentMesh, tet: [u32; 4]) -> Option<[u8; 4]> {
+        let link = self.link.first_chunk_mut()?;
+        if self.link_len + 4 < MOST {
+            return Some(tet.map(|v| mesh.number_vertex(v, link, &mut self.link_len)));
         }
-        let mut new = NewTet { corners: *corners, own: face as u8, beyond, source: t, ..NewTet::default() };
-        new.corners[face] = NEW;
-        new.across = [NO_ENTRY; 4];
-        new.across[at] = of;
-        for corner in (0..4).filter(|&k| k != at && k != face) {
-            // The face opposite this corner has the other one.
-            let other = 6 - at - face - corner;
-            self.ends.push(u32::from_be_bytes([0, corners[other], place as u8, corner as u8]));
+        let mut corners = [0; 4];
+        for (corner, v) in corners.iter_mut().zip(tet) {
+            *corner = mesh.vertex_number(v).map_or_else(
+                || {
+                    // One less than all numbers, so that a mark never overflows.
+                    let is_room = self.link_len + 1 < MOST;
+                    is_room.then(|| mesh.number_vertex(v, link, &mut self.link_len))
+                },
+                Some,
+            )?;
         }
-        self.star[place] = new;
-        self.star_len += 1;
-        Some(place as u8)
+        Some(corners)
     }
 
-    /// Joins the tetrahedra that fill gaps. All have the edge from the near to the new vertex: they must close up around it, or run from
-    /// boundary to boundary, in one piece.
+    /// Adds the tetrahedra that fill the gaps, and joins them. All have the edge from the near to the new vertex: they must close up around
+    /// it, or run from boundary to boundary, in one piece.
     ///
     /// ```text
     ///   seen along that edge, +        each gap has two faces with the edge, each with one vertex of the link:
-    ///                                  for both there is an entry in `ends`, which are sorted by these vertices
+    ///                                  there it has an end
     ///       b            b
     ///     1 │ 2        1 │ 2           closed   a0 a1 │ b1 b2 │ c2 c3 │ d0 d3     each vertex twice
     ///   a ──+── c    a ──+── c         open     a1 │ b1 b2 │ c2                   but for two of them
@@ -151,58 +154,61 @@ impl Scratch {
     ///       d
     /// ```
     ///
-    /// Two gaps with an entry at the same vertex meet in the face there. With three at a vertex, more than two gaps would meet. With one,
+    /// Two gaps with an end at the same vertex meet in the face there. With three at a vertex, more than two gaps would meet. With one,
     /// the face is of the boundary: there are none or two such ends. As every gap has two sides, the gaps then form circles, or one path
     /// and circles; that all are met on the way from one to the next shows that it is a single circle, or the path alone.
-    pub fn close_ring(&mut self) -> Option<()> {
-        let gaps = self.ends.len() / 2;
-        if gaps == 0 {
+    fn fill_gaps(&mut self, mesh: &CurrentMesh) -> Option<()> {
+        let (first, count) = (self.removed_len, self.gaps.len());
+        if count == 0 || first + count > MOST {
             return None;
         }
-        self.ends.sort_unstable();
+        self.star_len = first + count;
+        self.ends[..self.link_len].fill(NO_END);
+        let mut joined = 0;
+        for gap in first..self.star_len {
+            let [of, face] = self.gaps[gap - first].map(usize::from);
+            let NewTet { mut corners, own, source, .. } = self.star[of % MOST];
+            let beyond = mesh.neighbors[source as usize][face & 3];
+            self.star[of % MOST].across[face & 3] = gap as u8;
+            corners[usize::from(own) & 3] = 0;
+            corners[face & 3] = NEW;
+            let mut across = [NO_ENTRY; 4];
+            across[usize::from(own) & 3] = of as u8;
+            self.star[gap % MOST] =
+                NewTet { corners, across, own: face as u8, beyond, source, remover: NONE, inner: 0 };
+            for [side, vertex] in sides(usize::from(own), face) {
+                let end = &mut self.ends[usize::from(corners[vertex])];
+                match *end {
+                    JOINED => return None,
+                    NO_END => *end = [gap as u8, side as u8],
+                    [other, its] => {
+                        *end = JOINED;
+                        self.star[usize::from(other) % MOST].across[usize::from(its) & 3] = gap as u8;
+                        self.star[gap % MOST].across[side] = other;
+                        joined += 1;
+                    }
+                }
+            }
+        }
         // From one end, or from anywhere, all must be met.
-        let start = match self.join_gaps()? {
-            (0, _) => parts(self.ends[0]).1,
-            (2, lone) => lone?,
+        let start = match count - joined {
+            0 => first as u8,
+            1 => self.ends[..self.link_len].iter().find(|end| end[0] != NO_ENTRY)?[0],
             _ => return None,
         };
-        (self.met_from(start, gaps) == gaps).then_some(())
-    }
-
-    /// Joins the gaps that meet in a face, given the sorted ends. Returns how many ends are alone at their vertex, and the gap of the
-    /// first of them; none if three are at one.
-    #[inline]
-    fn join_gaps(&mut self) -> Option<(usize, Option<u8>)> {
-        let (mut alone, mut first, mut i) = (0, None, 0);
-        while i < self.ends.len() {
-            let (v, gap, corner) = parts(self.ends[i]);
-            let next = self.ends.get(i + 1).map(|&end| parts(end)).filter(|next| next.0 == v);
-            let Some((_, other, side)) = next else {
-                alone += 1;
-                first = first.or(Some(gap));
-                i += 1;
-                continue;
-            };
-            if self.ends.get(i + 2).is_some_and(|&third| parts(third).0 == v) {
-                return None;
-            }
-            self.star[gap as usize % MOST].across[corner as usize & 3] = other;
-            self.star[other as usize % MOST].across[side as usize & 3] = gap;
-            i += 2;
-        }
-        Some((alone, first))
+        (self.met_from(start, count) == count).then_some(())
     }
 
     /// How many gaps are met from `start` on, each behind a face of the one before: once around, or to the end. No more than one above
     /// `most` are counted.
-    #[inline]
     fn met_from(&self, start: u8, most: usize) -> usize {
         let (mut met, mut from, mut at) = (1, NO_ENTRY, start);
         while met <= most {
-            let NewTet { corners, across, own, .. } = self.star[at as usize % MOST];
-            // Opposite the new vertex is no gap, and opposite the near vertex (0) is what T_u left.
-            let next = (0..4).filter(|&k| k != own as usize && corners[k] != 0).map(|k| across[k]);
-            let Some(next) = next.filter(|&n| n != NO_ENTRY && n != from).min() else { break };
+            let NewTet { across, own, .. } = self.star[usize::from(at) % MOST];
+            let near = self.gap_near(usize::from(at));
+            // Opposite the new vertex is no gap, and opposite the near vertex is what T_u left.
+            let next = sides(near, usize::from(own)).map(|[side, _]| across[side]);
+            let Some(next) = next.into_iter().find(|&n| n != NO_ENTRY && n != from) else { break };
             if next == start {
                 break;
             }
@@ -212,128 +218,70 @@ impl Scratch {
         met
     }
 
+    /// The corner of a gap that is the near vertex: where the tetrahedron has the new vertex behind whose face it lies.
+    #[inline]
+    fn gap_near(&self, gap: usize) -> usize {
+        let of = self.gaps[(gap - self.removed_len) % self.gaps.len()][0];
+        usize::from(self.star[usize::from(of) % MOST].own)
+    }
+
     /// Hashes the labels of the star.
     pub fn hash_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
-        let Self { star, star_len, link, link_len, hashes, tet_hashes, .. } = self;
-        let labels = link[..*link_len].iter().map(|&slot| mesh.vertex(slot).0).chain([vertex]);
-        hash_labels(labels, &star[..*star_len], hashes, tet_hashes);
+        let Self { star, star_len, link, link_len, hashes, .. } = self;
+        let labels = link[..*link_len].iter().map(|&slot| mesh.vertex(slot).0);
+        hashes.set(labels, vertex, &star[..*star_len]);
     }
 
-    /// Puts the star, which has been hashed, into canonical order.
-    pub fn sort_star(&mut self) {
-        const PLACE: u64 = MOST as u64 - 1;
-        self.sorted.clear();
-        self.sorted.extend((0..).zip(&self.tet_hashes).map(|(i, hash)| hash & !PLACE | i));
-        self.sorted.sort_unstable();
-    }
-
-    /// Whether all tetrahedra of the star are positive with the new vertex at `position`.
-    pub fn is_positive(&self, mesh: &CurrentMesh, position: [i32; 3]) -> bool {
-        let link = self.link[..self.link_len].iter().map(|&v| mesh.positions[v as usize]);
-        is_positive(&self.star[..self.star_len], link, position)
-    }
-
-    /// Predicts the levels of a vertex at `position` from those around it.
-    pub fn predict_levels(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
+    /// Puts the new vertex at `position`, and predicts its levels from those around it.
+    pub fn place(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
+        let link = &self.link[..self.link_len];
+        self.places.set(link.iter().map(|&v| mesh.positions[v as usize]), position);
         self.levels.resize(mesh.fields, 0);
-        let link = self.link[..self.link_len].iter();
-        let link = link.map(|&v| (mesh.positions[v as usize], mesh.levels(v)));
-        predict_levels(link, position, &mut self.levels);
+        self.places.predict_levels(|v| mesh.levels(link[v]), &mut self.levels);
     }
 }
 
-/// Hashes the labels of the vertices of a link, of which the new vertex comes last, and for each tetrahedron of the star the sum of those
-/// of its corners.
-pub(super) fn hash_labels(
-    labels: impl Iterator<Item = u32>,
-    star: &[NewTet],
-    hashes: &mut Vec<u64>,
-    tet_hashes: &mut Vec<u64>,
-) {
-    hashes.clear();
-    hashes.extend(labels.map(spread));
-    tet_hashes.clear();
-    let hash = |corner: u8| hashes[usize::from(corner).min(hashes.len() - 1)];
-    let sum = |new: &NewTet| new.corners.iter().fold(0, |sum: u64, &corner| sum.wrapping_add(hash(corner)));
-    tet_hashes.extend(star.iter().map(sum));
+/// Hashes of the vertices and the tetrahedra of a star.
+#[derive(Clone, Debug)]
+pub(in crate::mt) struct Hashes {
+    /// Of the labels of the vertices.
+    pub vertices: ByCorner<u64>,
+    /// For each tetrahedron, the sum of those of its corners.
+    pub tets: Vec<u64>,
 }
 
-/// Whether all tetrahedra of a star are positive with the new vertex at `position`, given those of its link.
-pub(super) fn is_positive(star: &[NewTet], link: impl Iterator<Item = [i32; 3]>, position: [i32; 3]) -> bool {
-    let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
-    for (from, p) in from.iter_mut().zip(link) {
-        for k in 0..3 {
-            from[k] = i64::from(p[k]) - i64::from(position[k]);
-            largest |= from[k].unsigned_abs();
-        }
-    }
-    let narrow = largest <= 1 << NARROW_BITS;
-    star.iter().all(|new| {
-        let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
-        if narrow {
-            return det_i64(from[i], from[j], from[k]) > 0;
-        }
-        let at = |x: usize| [0, 1, 2].map(|k| (from[x][k] + i64::from(position[k])) as i32);
-        orient3d(position, at(i), at(j), at(k)) > 0
-    })
-}
-
-/// Predicts the levels of a vertex at `position` from positions and levels around it: means by inverse squared distance, in whole
-/// numbers, so that the order of the link does not matter.
-pub(super) fn predict_levels<'a>(
-    link: impl Iterator<Item = ([i32; 3], &'a [i32])> + Clone,
-    position: [i32; 3],
-    levels: &mut [i32],
-) {
-    let largest = link.clone().map(|(p, _)| squared(p, position)).max().unwrap_or(1).max(1);
-    for (field, level) in levels.iter_mut().enumerate() {
-        let (mut total, mut sum) = (0_u128, 0_u128);
-        for (p, levels) in link.clone() {
-            let weight = weight(largest, squared(p, position));
-            total += weight;
-            // Levels are not negative.
-            sum += weight * u128::from(levels[field].unsigned_abs());
-        }
-        *level = mean(sum, total.max(1)) as i32;
+impl Default for Hashes {
+    fn default() -> Self {
+        Self { vertices: [0; _], tets: Vec::new() }
     }
 }
 
-/// The parts of an entry of [`Scratch::ends`].
+impl Hashes {
+    /// Hashes a star, given the labels of its link and of the new vertex.
+    pub fn set(&mut self, link: impl Iterator<Item = u32>, vertex: u32, star: &[NewTet]) {
+        self.vertices.iter_mut().zip(link).for_each(|(hash, label)| *hash = spread(label));
+        self.vertices[usize::from(NEW)] = spread(vertex);
+        let hash = |corner: u8| self.vertices[usize::from(corner)];
+        self.tets.clear();
+        self.tets.extend(star.iter().map(|new| {
+            let [a, b, c, d] = new.corners.map(hash);
+            a.wrapping_add(b).wrapping_add(c).wrapping_add(d)
+        }));
+    }
+
+    /// The hash of a face of tetrahedron `tet`, given the corner opposite it.
+    pub fn of_face(&self, tet: usize, opposite: u8) -> u64 {
+        self.tets[tet].wrapping_add(self.vertices[usize::from(opposite)].rotate_left(17))
+    }
+}
+
+/// The corners of a gap that are neither the near vertex nor the new one, twice: one whose opposite face has the edge between these, and the
+/// vertex of that face.
 #[inline]
-fn parts(end: u32) -> (u8, u8, u8) {
-    let [_, vertex, gap, corner] = end.to_be_bytes();
-    (vertex, gap, corner)
+fn sides(near: usize, new: usize) -> [[usize; 2]; 2] {
+    let [_, _, a, b] = TURN[(4 * near + new) % 16].map(|corner| usize::from(corner) & 3);
+    [[a, b], [b, a]]
 }
-
-/// The squared distance of two positions.
-#[inline]
-fn squared(p: [i32; 3], position: [i32; 3]) -> u64 {
-    // Less than 2^62 each: positions are on lattices of at most 30 bits.
-    (0..3).map(|k| u64::from(p[k].abs_diff(position[k]))).fold(0, |sum, d| sum.saturating_add(d * d))
-}
-
-#[inline]
-fn weight(largest: u64, squared: u64) -> u128 {
-    let squared = squared.max(1);
-    // Short numbers divide many times as fast.
-    if largest < 1 << (64 - WEIGHT_BITS) {
-        u128::from((largest << WEIGHT_BITS) / squared)
-    } else {
-        (u128::from(largest) << WEIGHT_BITS) / u128::from(squared)
-    }
-}
-
-/// The quotient, rounded.
-#[inline]
-fn mean(sum: u128, total: u128) -> u128 {
-    match (u64::try_from(2 * sum + total), u64::try_from(2 * total)) {
-        (Ok(sum), Ok(total)) => u128::from(sum / total),
-        _ => (2 * sum + total) / (2 * total),
-    }
-}
-
-/// Weights of the vertices around a new one have at least so many bits.
-const WEIGHT_BITS: u32 = 8;
 
 /// Spreads a label over the bits of a word (the constants are those of SplitMix64).
 #[inline]

@@ -14,13 +14,15 @@
 //! All of this is the same in every consistent set, for the star is: positions are integers, sums of floating-point
 //! numbers have a fixed order, and ties are broken by labels.
 
-use super::scratch::{MOST, NO_ENTRY, NewTet, Scratch, hash_labels};
+use super::new_star::{ByCorner, MOST, NEW, NewTet};
+use super::places::{Places, Way, larger, minus};
+use super::scratch::{Hashes, Scratch, spread};
 use super::store::{ForestChild, HalfEdgeMt};
-use crate::geom::orient3d;
 use crate::mesh::NONE;
 use crate::mt::mesh::paged_array::PagedArray;
-use crate::mt::mesh::tet::TURN;
+use crate::mt::ranks::rank;
 use crate::mt::{CurrentMesh, UpdateId};
+use arrayvec::ArrayVec;
 use std::mem::take;
 
 /// Most candidates that have a rank.
@@ -29,58 +31,136 @@ const RANKED: usize = 8;
 /// Candidates are ranked until what is left has less weight than this.
 const LEFT: f64 = 1.0 / 64.0;
 
+/// Stands for the place of a candidate where nothing removes a tetrahedron.
+const NO_CANDIDATE: u16 = u16::MAX;
+
 /// Stands for a remover that has no rank.
 const FURTHER: u32 = NONE - 1;
+
+/// A forest child of a vertex of the star that comes later: it may remove the tetrahedra at its near vertex.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    /// Its near vertex, as a corner of tetrahedra of the star.
+    near: u8,
+    update: u32,
+    way: Way,
+}
+
+impl Candidate {
+    fn new(near: u8, child: &ForestChild) -> Self {
+        Self { near, update: child.update, way: Way::new(child.offset) }
+    }
+}
 
 /// A candidate for the removal of a tetrahedron, or none of them, or one of those without a rank.
 #[derive(Clone, Copy, Debug, Default)]
 struct Choice {
-    weight: f64,
-    /// The weight before neighbours were looked at.
-    first_weight: f64,
     remover: u32,
-    /// The place of the remover among the forest children of its near vertex that come later.
-    place: u32,
-    /// The corner of the tetrahedron that is its near vertex.
-    corner: u8,
+    /// Its place among the candidates of the star.
+    candidate: u16,
 }
 
 /// The choices for a tetrahedron, in the order of the candidates; what is left comes last.
 #[derive(Clone, Debug, Default)]
 struct Choices {
     all: [Choice; RANKED + 1],
+    weights: [f64; RANKED + 1],
     len: usize,
+    /// What the candidates so far leave, and their largest weight.
+    left: f64,
+    largest: f64,
+    /// The sum of the corners.
+    sum: [f64; 3],
 }
 
+/// Forest children of a vertex of the star that come later.
+#[derive(Clone, Copy)]
+struct Later<'a> {
+    /// The update of the first; [`NONE`] if there are no children.
+    first: u32,
+    /// The vertex, as a corner of tetrahedra of the star.
+    near: u8,
+    children: &'a [ForestChild],
+}
+
+impl<'a> Later<'a> {
+    #[inline]
+    fn new(near: u8, children: &'a [ForestChild]) -> Self {
+        Self { first: children.first().map_or(NONE, |child| child.update), near, children }
+    }
+}
+
+/// Where the next update of ascending lists is, merged.
+#[inline]
+fn least(lists: &[Later<'_>]) -> Option<usize> {
+    let (mut at, mut least) = (None, NONE);
+    for (i, list) in lists.iter().enumerate() {
+        if list.first < least {
+            (at, least) = (Some(i), list.first);
+        }
+    }
+    at
+}
+
+/// The next update of ascending lists, merged, and its near vertex.
+fn pop_least<'a>(lists: &mut [Later<'a>]) -> Option<(u8, &'a ForestChild)> {
+    let list = &mut lists[least(lists)?];
+    let (child, rest) = list.children.split_first()?;
+    *list = Later::new(list.near, rest);
+    Some((list.near, child))
+}
+
+/// Lists of the vertices of a star.
+type Lists<'a> = ArrayVec<Later<'a>, MOST>;
+
+/// The tetrahedra of a star that are in a set, a bit for each.
+type TetSet = [u64; MOST / 64];
+
 /// Scratch space: what may remove each tetrahedron of a star.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(in crate::mt) struct StarCode {
     choices: Vec<Choices>,
-    /// The vertices of the link, and then the new one.
-    positions: Vec<[i32; 3]>,
+    /// Those that have a rank in a tetrahedron, ascending; then those that remove one without a rank.
+    candidates: Vec<Candidate>,
+    /// How many candidates there are at each vertex, and the tetrahedra around it.
+    counts: ByCorner<u32>,
+    around: ByCorner<TetSet>,
     /// What has to be stored, by rising certainty: see [`entry`].
-    order: Vec<u128>,
-    /// The corner of each tetrahedron that is the near vertex of its remover.
-    near: Vec<u8>,
-    /// From that corner to the vertex that its remover inserts.
-    offsets: Vec<[i32; 3]>,
-    /// Of which tetrahedra the remover is known by now.
-    decided: Vec<bool>,
-    /// When a code is written: the hashes of the vertices and of the tetrahedra, what removes these, and the code so far.
-    hashes: Vec<u64>,
-    tet_hashes: Vec<u64>,
+    order: Vec<u64>,
+    /// What removes each tetrahedron, [`NONE`] if nothing does, 0 as long as that is not known: no update that comes later has this number.
+    /// Also that of [`NO_ENTRY`] is not known.
+    known: ByCorner<u32>,
+    /// The candidate that removes each tetrahedron, by its place; beyond all if none does.
+    chosen: [u16; MOST],
+    /// When a code is written: the hashes, what removes the tetrahedra, and the code so far.
+    hashes: Hashes,
     truth: Vec<(u32, u8)>,
     symbols: Vec<u8>,
     bits: Vec<bool>,
 }
 
-/// A vertex of a link, or the new one: its label, where it is, and its forest children.
-pub(super) type StarVertex<'a> = (u32, [i32; 3], &'a [ForestChild]);
+impl Default for StarCode {
+    fn default() -> Self {
+        Self {
+            choices: Vec::new(),
+            candidates: Vec::new(),
+            counts: [0; _],
+            around: [[0; _]; _],
+            order: Vec::new(),
+            known: [0; _],
+            chosen: [0; _],
+            hashes: Hashes::default(),
+            truth: Vec::new(),
+            symbols: Vec::new(),
+            bits: Vec::new(),
+        }
+    }
+}
 
 /// Writes or reads what cannot be predicted.
 trait CodeIo {
-    /// Which of the choices it is.
-    fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice>;
+    /// Which of the choices it is, given their weights and the first of those that come first.
+    fn choose(&mut self, tet: usize, choices: &[Choice], weights: &[f64], first: usize) -> Option<usize>;
     /// Of the candidates without a rank, 0 for none.
     fn further(&mut self, tet: usize, index_of: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32>;
     /// How many faces more may not be as guessed.
@@ -105,17 +185,11 @@ impl Reader<'_> {
 }
 
 impl CodeIo for Reader<'_> {
-    fn choose(&mut self, _: usize, choices: &mut [Choice]) -> Option<Choice> {
-        let rank = usize::from(self.symbol());
-        if rank == 0 {
-            // The first of those that come first.
-            return choices
-                .iter()
-                .copied()
-                .reduce(|best, choice| if comes_before(&choice, &best).is_lt() { choice } else { best });
+    fn choose(&mut self, _: usize, _: &[Choice], weights: &[f64], first: usize) -> Option<usize> {
+        match usize::from(self.symbol()) {
+            0 => Some(first),
+            rank => (0..weights.len()).find(|&choice| rank_of(choice, weights) == rank),
         }
-        choices.sort_by(comes_before);
-        choices.get(rank).copied()
     }
 
     fn further(&mut self, _: usize, _: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32> {
@@ -151,13 +225,12 @@ struct Writer<'a> {
 }
 
 impl CodeIo for Writer<'_> {
-    fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice> {
-        choices.sort_by(comes_before);
+    fn choose(&mut self, tet: usize, choices: &[Choice], weights: &[f64], _: usize) -> Option<usize> {
         let remover = self.truth[tet].0;
-        let rank = choices.iter().position(|choice| choice.remover == remover);
-        let rank = rank.or_else(|| choices.iter().position(|choice| choice.remover == FURTHER))?;
-        self.symbols.push(rank as u8);
-        choices.get(rank).copied()
+        let find = |remover: u32| choices.iter().position(|choice| choice.remover == remover);
+        let choice = find(remover).or_else(|| find(FURTHER))?;
+        self.symbols.push(rank_of(choice, weights) as u8);
+        Some(choice)
     }
 
     fn further(&mut self, tet: usize, index_of: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32> {
@@ -190,7 +263,6 @@ impl HalfEdgeMt {
         &self,
         mesh: &CurrentMesh,
         u: UpdateId,
-        position: [i32; 3],
         scratch: &mut Scratch,
         code: &mut StarCode,
     ) -> Option<()> {
@@ -199,69 +271,63 @@ impl HalfEdgeMt {
             Some((&count, rest)) => rest.split_at_checked(usize::from(count))?,
             None => (star, star),
         };
-        self.code_with(mesh, u, position, (scratch, code), &mut Reader { symbols, bits, at: 0 })
-    }
-
-    fn code_with(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        position: [i32; 3],
-        (scratch, code): (&mut Scratch, &mut StarCode),
-        io: &mut impl CodeIo,
-    ) -> Option<()> {
-        let Scratch { star, star_len, link, link_len, hashes, tet_hashes, .. } = scratch;
-        let (star, link) = (&mut star[..*star_len], &link[..*link_len]);
+        let Scratch { star, star_len, link, link_len, places, hashes, .. } = scratch;
         let vertex = self.vertex(u);
-        let lists: Vec<&[ForestChild]> = link
-            .iter()
-            .map(|&slot| mesh.vertex(slot))
-            .chain([vertex])
-            .map(|v| later(self.children_of(v), u))
-            .collect();
-        code.positions.clear();
-        code.positions.extend(link.iter().map(|&slot| mesh.positions[slot as usize]));
-        code.positions.push(position);
-        code.run(&Around { hashes, tet_hashes, lists }, star, io)
+        let children = |corner: u8| {
+            let label = if corner == NEW { vertex } else { mesh.vertex(link[usize::from(corner)]) };
+            later(self.children_of(label), u)
+        };
+        let around = Around { link_len: *link_len, places, hashes, children };
+        code.run(&around, &mut star[..*star_len], &mut Reader { symbols, bits, at: 0 })
     }
 }
 
 impl StarCode {
-    /// Appends the code of the star of `u`, whose tetrahedra have what removes them. `vertices` are those of the link and then the new one.
-    /// None if it has no code.
+    /// Appends the code of the star of `u`, whose tetrahedra have what removes them; its vertices are at `places`. `link` has the labels of
+    /// its link, `children` the forest children of a vertex. None if it has no code.
     pub(super) fn write<'a>(
         &mut self,
-        u: UpdateId,
+        (u, vertex): (UpdateId, u32),
         star: &mut [NewTet],
-        vertices: impl Iterator<Item = StarVertex<'a>> + Clone,
+        link: impl ExactSizeIterator<Item = u32> + Clone,
+        places: &Places,
+        children: impl Fn(u32) -> &'a [ForestChild],
         out: &mut Vec<u8>,
     ) -> Option<()> {
-        let (mut hashes, mut tet_hashes) = (take(&mut self.hashes), take(&mut self.tet_hashes));
-        hash_labels(vertices.clone().map(|vertex| vertex.0), star, &mut hashes, &mut tet_hashes);
-        let mut truth = take(&mut self.truth);
+        let (mut hashes, mut truth) = (take(&mut self.hashes), take(&mut self.truth));
+        hashes.set(link.clone(), vertex, star);
         truth.clear();
         truth.extend(star.iter().map(|new| (new.remover, new.inner)));
         let (mut symbols, mut bits) = (take(&mut self.symbols), take(&mut self.bits));
         symbols.clear();
         bits.clear();
-        self.positions.clear();
-        self.positions.extend(vertices.clone().map(|vertex| vertex.1));
-        let lists = vertices.map(|vertex| later(vertex.2, u)).collect();
-        let around = Around { hashes: &hashes, tet_hashes: &tet_hashes, lists };
+        let children = |corner: u8| {
+            let label = if corner == NEW { Some(vertex) } else { link.clone().nth(usize::from(corner)) };
+            label.map_or(&[][..], |label| later(children(label), u))
+        };
+        let around = Around { link_len: link.len(), places, hashes: &hashes, children };
         let mut writer = Writer { truth: &truth, symbols, bits };
         let done = self.run(&around, star, &mut writer).and_then(|()| writer.finish(out));
         (symbols, bits) = (writer.symbols, writer.bits);
-        (self.hashes, self.tet_hashes, self.truth) = (hashes, tet_hashes, truth);
+        (self.hashes, self.truth) = (hashes, truth);
         (self.symbols, self.bits) = (symbols, bits);
         done
     }
 
-    /// Finds what removes the tetrahedra of a star, given where its vertices are.
-    fn run(&mut self, around: &Around<'_>, star: &mut [NewTet], io: &mut impl CodeIo) -> Option<()> {
+    /// Finds what removes the tetrahedra of a star.
+    fn run<'a>(
+        &mut self,
+        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
+        star: &mut [NewTet],
+        io: &mut impl CodeIo,
+    ) -> Option<()> {
         star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
-        if around.lists.iter().all(|list| list.is_empty()) {
+        let mut lists = Lists::new();
+        self.find_children(around, &mut lists);
+        if lists.is_empty() {
             return Some(());
         }
+        self.rank(&mut lists, around.places, star);
         self.find_removers(around, star, io)?;
         self.find_inner(around, star, io);
         Some(())
@@ -297,193 +363,252 @@ fn later(children: &[ForestChild], u: UpdateId) -> &[ForestChild] {
     }
 }
 
-/// What surrounds a new vertex, by index into its link; the vertex itself is the last.
-struct Around<'a> {
-    hashes: &'a [u64],
-    /// The hashes of the tetrahedra.
-    tet_hashes: &'a [u64],
-    /// The forest children that come later.
-    lists: Vec<&'a [ForestChild]>,
-}
-
-impl<'a> Around<'a> {
-    fn list(&self, corner: u8) -> &'a [ForestChild] {
-        self.lists[usize::from(corner).min(self.lists.len() - 1)]
-    }
-
-    fn lists_of(&self, new: &NewTet) -> [&'a [ForestChild]; 4] {
-        let [a, b, c, d] = new.corners;
-        [self.list(a), self.list(b), self.list(c), self.list(d)]
-    }
+/// What surrounds a new vertex.
+struct Around<'a, F> {
+    link_len: usize,
+    places: &'a Places,
+    hashes: &'a Hashes,
+    /// The forest children of a vertex that come later, by its corner.
+    children: F,
 }
 
 /// Levels of certainty.
 const CERTAINTIES: f64 = 4095.0;
 
-/// The place of something in the order of rising certainty, ties broken by a hash.
-fn key(certainty: f64, hash: u64) -> u64 {
+/// The place of something in the order of rising certainty, with its tetrahedron and face in the lowest bits. Ties are broken by a hash,
+/// of which this has the first bits.
+fn entry(certainty: f64, hash: u64, tet: usize, face: u8) -> u64 {
     let level = (certainty.clamp(0.0, 1.0) * CERTAINTIES) as u64;
-    level << 52 | hash >> 12
-}
-
-/// A key with a tetrahedron and a face, in one number: these decide where keys are equal.
-fn entry(key: u64, tet: u8, face: u8) -> u128 {
-    u128::from(key) << 16 | u128::from(tet) << 8 | u128::from(face)
+    level << 52 | hash >> 28 << 16 | (tet as u64) << 8 | u64::from(face)
 }
 
 /// Tetrahedron and face of such a number.
-fn parts(entry: u128) -> (usize, u8) {
+fn parts(entry: u64) -> (usize, u8) {
     (usize::from((entry >> 8) as u8), entry as u8)
 }
 
-/// Choices by falling weight, equal ones by the weights that they had first, and then as they came.
-fn comes_before(a: &Choice, b: &Choice) -> std::cmp::Ordering {
-    b.weight.total_cmp(&a.weight).then(b.first_weight.total_cmp(&a.first_weight))
+/// Sorts entries, given the hashes of tetrahedra and faces.
+fn sort_entries(entries: &mut [u64], hash: impl Fn(usize, u8) -> u64) {
+    if sort_by_first_bits(entries).is_none() {
+        let whole = |&entry: &u64| (entry >> 52, hash(parts(entry).0, parts(entry).1 & 3) >> 12, entry);
+        entries.sort_by_key(whole);
+    }
+}
+
+/// Sorts entries by their first bits, without branches. None if there are too many, or two are equal in these bits.
+fn sort_by_first_bits(entries: &mut [u64]) -> Option<()> {
+    let (mut keys, mut ranks) = ([i32::MAX; FEW_ENTRIES], [0; FEW_ENTRIES]);
+    keys.get_mut(..entries.len())?
+        .iter_mut()
+        .zip(&*entries)
+        .for_each(|(key, entry)| *key = (entry >> 33) as i32);
+    rank(&keys, entries.len(), &mut ranks);
+    let mut sorted = [u64::MAX; FEW_ENTRIES];
+    entries.iter().zip(ranks).for_each(|(&entry, rank)| sorted[rank as usize % FEW_ENTRIES] = entry);
+    let sorted = &sorted[..entries.len()];
+    // Equal ones have the same rank: then a place is empty.
+    sorted.iter().all(|&entry| entry != u64::MAX).then(|| entries.copy_from_slice(sorted))
+}
+
+/// More entries than this are sorted as a list.
+const FEW_ENTRIES: usize = 32;
+
+/// The place of a choice by falling weight; equal ones are in their order.
+fn rank_of(choice: usize, weights: &[f64]) -> usize {
+    let own = weights[choice];
+    let (before, after) = weights.split_at(choice);
+    before.iter().filter(|&&weight| weight >= own).count()
+        + after.iter().filter(|&&weight| weight > own).count()
 }
 
 impl StarCode {
-    fn find_removers(
+    /// Finds the forest children that come later at the vertices of the star; where there are none, there is no list.
+    fn find_children<'a>(
         &mut self,
-        around: &Around<'_>,
+        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
+        lists: &mut Lists<'a>,
+    ) {
+        for near in (0..around.link_len as u8).chain([NEW]) {
+            let children = (around.children)(near);
+            self.counts[usize::from(near)] = children.len() as u32;
+            self.around[usize::from(near)] = TetSet::default();
+            if !children.is_empty() {
+                lists.push(Later::new(near, children));
+            }
+        }
+    }
+
+    /// Finds the choices for each tetrahedron.
+    ///
+    /// The lists are merged. Each candidate is weighed in the tetrahedra around its near vertex that are still open: that rank more of them.
+    fn rank(&mut self, lists: &mut Lists<'_>, places: &Places, star: &[NewTet]) {
+        let Self { choices, candidates, counts, around, .. } = self;
+        if choices.len() < star.len() {
+            choices.resize_with(star.len(), Choices::default);
+        }
+        let mut open = TetSet::default();
+        for (i, (new, choices)) in star.iter().zip(&mut *choices).enumerate() {
+            let (half, bit) = (i / 64, 1 << (i % 64));
+            open[half] |= bit;
+            new.corners.iter().for_each(|&corner| around[usize::from(corner)][half] |= bit);
+            let [a, b, c, d] = new.corners.map(|corner| places.from[usize::from(corner)]);
+            choices.sum = [0, 1, 2].map(|k| a[k] + b[k] + c[k] + d[k]);
+            (choices.len, choices.left, choices.largest) = (0, 1.0, 0.0);
+        }
+        candidates.clear();
+        while let Some(at) = least(lists) {
+            let Later { near, children, .. } = lists[at];
+            let Some((child, rest)) = children.split_first() else { break };
+            let candidate = Candidate::new(near, child);
+            let place = candidates.len() as u16;
+            candidates.push(candidate);
+            let from = places.from[usize::from(near)].map(|x| 4.0 * x);
+            let mut is_open = false;
+            for (half, open) in open.iter_mut().enumerate().take(star.len().div_ceil(64)) {
+                let (around, mut still) = (around[usize::from(near)][half], *open);
+                let mut bits = around & still;
+                while bits != 0 {
+                    let choices = &mut choices[64 * half + bits.trailing_zeros() as usize];
+                    let share = candidate.way.share(minus(choices.sum, from));
+                    let weight = choices.left * share;
+                    choices.all[choices.len % RANKED] =
+                        Choice { remover: candidate.update, candidate: place };
+                    choices.weights[choices.len % RANKED] = weight;
+                    choices.largest = larger(choices.largest, weight);
+                    choices.len += 1;
+                    choices.left *= 1.0 - share;
+                    if choices.len == RANKED || choices.left < LEFT {
+                        still ^= bits & bits.wrapping_neg();
+                    }
+                    bits &= bits - 1;
+                }
+                *open = still;
+                is_open |= around & still != 0;
+            }
+            if is_open && !rest.is_empty() {
+                lists[at] = Later::new(near, rest);
+            } else {
+                lists.swap_remove(at);
+            }
+        }
+        for (new, Choices { all, weights, len, left, largest, .. }) in star.iter().zip(choices) {
+            let [a, b, c, d] = new.corners.map(|corner| u64::from(counts[usize::from(corner)]));
+            let remover = if a + b + c + d > *len as u64 { FURTHER } else { NONE };
+            all[*len] = Choice { remover, ..Choice::default() };
+            weights[*len] = *left;
+            *largest = larger(*largest, *left);
+            *len += 1;
+        }
+    }
+
+    fn find_removers<'a>(
+        &mut self,
+        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
         star: &mut [NewTet],
         io: &mut impl CodeIo,
     ) -> Option<()> {
-        self.rank(around, star);
-        self.decided.clear();
         self.order.clear();
         for (i, choices) in self.choices[..star.len()].iter().enumerate() {
             // What can only be one thing is not stored.
-            self.decided.push(choices.len == 1);
+            self.known[i] = if choices.len == 1 { NONE } else { 0 };
             if choices.len > 1 {
-                let largest =
-                    choices.all[..choices.len].iter().fold(0.0, |w: f64, choice| w.max(choice.weight));
-                self.order.push(entry(key(largest, around.tet_hashes[i]), i as u8, 0));
+                self.order.push(entry(choices.largest, around.hashes.tets[i], i, 0));
             }
         }
-        self.near.clear();
-        self.near.resize(star.len(), 0);
-        self.offsets.clear();
-        self.offsets.resize(star.len(), [0; 3]);
-        self.order.sort_unstable();
+        self.chosen[..star.len()].fill(NO_CANDIDATE);
+        sort_entries(&mut self.order, |i, _| around.hashes.tets[i]);
         for at in 0..self.order.len() {
             let (i, _) = parts(self.order[at]);
-            let choices = &mut self.choices[i];
-            let choices = &mut choices.all[..choices.len];
-            weigh_by_neighbors(choices, &star[i], star, &self.decided);
-            let choice = io.choose(i, choices)?;
-            self.decided[i] = true;
-            let (corner, child) = match choice.remover {
-                NONE => continue,
-                FURTHER => match self.further(around, &star[i], i, io)? {
-                    Some(found) => found,
-                    None => continue,
-                },
-                _ => {
-                    let list = around.list(star[i].corners[usize::from(choice.corner) & 3]);
-                    (choice.corner, *list.get(choice.place as usize)?)
-                }
+            let Choices { all, weights, len, .. } = &mut self.choices[i];
+            let (choices, weights) = (&all[..*len], &mut weights[..*len]);
+            let known = star[i].across.map(|n| self.known[usize::from(n)]);
+            let first = weigh_by_neighbors(choices, weights, known);
+            let choice = *choices.get(io.choose(i, choices, weights, first)?)?;
+            let place = match choice.remover {
+                NONE => NO_CANDIDATE,
+                FURTHER => self.further(around, &star[i], i, io)?,
+                _ => choice.candidate,
             };
-            star[i].remover = child.update;
-            self.near[i] = corner;
-            self.offsets[i] = child.offset;
+            let remover = self.candidates.get(usize::from(place)).map_or(NONE, |candidate| candidate.update);
+            (self.chosen[i], self.known[i], star[i].remover) = (place, remover, remover);
         }
         Some(())
     }
 
-    /// The corners of a tetrahedron.
-    #[inline]
-    fn corners(&self, new: &NewTet) -> [[i32; 3]; 4] {
-        let newest = self.positions.len() - 1;
-        let [a, b, c, d] = new.corners;
-        let at = |corner: u8| self.positions[usize::from(corner).min(newest)];
-        [at(a), at(b), at(c), at(d)]
-    }
-
-    /// Finds the choices for each tetrahedron.
-    fn rank(&mut self, around: &Around<'_>, star: &[NewTet]) {
-        if self.choices.len() < star.len() {
-            self.choices.resize_with(star.len(), Choices::default);
-        }
-        for (i, new) in star.iter().enumerate() {
-            let corners = self.corners(new);
-            rank_tet(&mut self.choices[i], &around.lists_of(new), &corners);
-        }
-    }
-
-    /// The candidate without a rank that is stored by its number, and the corner that is its near vertex; or that there is none.
+    /// The place of the candidate without a rank that is stored by its number, or of none.
     #[cold]
-    fn further(
-        &self,
-        around: &Around<'_>,
+    fn further<'a>(
+        &mut self,
+        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
         new: &NewTet,
         i: usize,
         io: &mut impl CodeIo,
-    ) -> Option<Option<(u8, ForestChild)>> {
-        let lists = around.lists_of(new);
-        let mut rest = [0; 4];
+    ) -> Option<u16> {
+        let mut rest = new.corners.map(|corner| Later::new(corner, (around.children)(corner)));
         // All choices but the last have a rank.
         for _ in 1..self.choices[i].len {
-            pop_least(&lists, &mut rest)?;
+            pop_least(&mut rest)?;
         }
         let mut index_of = |remover: u32| {
             if remover == NONE {
                 return Some(0);
             }
             let mut next = rest;
-            (1..)
-                .map_while(|index| pop_least(&lists, &mut next).map(|found| (index, found.1.update)))
-                .find(|found| found.1 == remover)
-                .map(|found| found.0)
+            let mut popped = (1..).map_while(|index| Some((index, pop_least(&mut next)?.1.update)));
+            popped.find(|found| found.1 == remover).map(|found| found.0)
         };
         let index = io.further(i, &mut index_of)?;
         let mut found = None;
         for _ in 0..index {
-            found = Some(pop_least(&lists, &mut rest)?);
+            found = Some(pop_least(&mut rest)?);
         }
-        Some(found)
+        let Some((near, child)) = found else { return Some(NO_CANDIDATE) };
+        self.candidates.push(Candidate::new(near, child));
+        Some(self.candidates.len() as u16 - 1)
     }
 
-    fn find_inner(&mut self, around: &Around<'_>, star: &mut [NewTet], io: &mut impl CodeIo) {
+    fn find_inner<'a>(
+        &mut self,
+        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
+        star: &mut [NewTet],
+        io: &mut impl CodeIo,
+    ) {
         self.order.clear();
         // Those that are not stored are as predicted.
         let bits = io.bits_left();
-        for i in 0..star.len() {
-            let new = star[i];
-            if new.remover == NONE {
-                continue;
+        for (i, new) in star.iter_mut().enumerate() {
+            let Some(candidate) = self.candidates.get(usize::from(self.chosen[i])) else { continue };
+            let near = new.corners.iter().position(|&corner| corner == candidate.near).unwrap_or(0);
+            // Across the face opposite the new vertex, and across those of the boundary, nothing is known.
+            let (mut same, mut later) = (0_u8, 0_u8);
+            for (face, n) in new.across.into_iter().enumerate() {
+                let other = self.known[usize::from(n)];
+                same |= u8::from(other == new.remover) << face;
+                later |= u8::from(other > new.remover) << face;
             }
-            let near = usize::from(self.near[i]) & 3;
-            let view = View::new(&self.corners(&new), near, self.offsets[i]);
-            for face in (0..4).filter(|&face| face != near) {
-                let behind = new.across[face];
-                if face != usize::from(new.own) && behind != NO_ENTRY {
-                    let other = star[usize::from(behind) % MOST].remover;
-                    if other == new.remover {
-                        star[i].inner |= 1 << face;
-                        continue;
-                    }
-                    if other > new.remover {
-                        continue;
-                    }
-                }
-                let Some(sine) = view.elevation(face) else {
-                    star[i].inner |= 1 << face;
+            let at_near = !(1 << near) & 15;
+            new.inner = same & at_near;
+            let mut open = !(same | later) & at_near;
+            while open != 0 {
+                let face = open.trailing_zeros() as usize & 3;
+                open &= open - 1;
+                let Some(sine) = around.places.elevation(new, [near, face], &candidate.way) else {
+                    new.inner |= 1 << face;
                     continue;
                 };
                 let guess = u8::from(sine < STEEP);
                 if bits == 0 {
-                    star[i].inner |= guess << face;
+                    new.inner |= guess << face;
                     continue;
                 }
-                let face_hash = around.hashes[usize::from(new.corners[face]).min(around.hashes.len() - 1)]
-                    .rotate_left(17);
-                let key = key((sine - STEEP).abs(), around.tet_hashes[i].wrapping_add(face_hash));
-                self.order.push(entry(key, i as u8, face as u8 | guess << 7));
+                let hash = around.hashes.of_face(i, new.corners[face]);
+                self.order.push(entry((sine - STEEP).abs(), hash, i, face as u8 | guess << 7));
             }
         }
         let stored = bits.min(self.order.len());
         if stored > 0 {
-            self.order.sort_unstable();
+            let hash = |i: usize, face: u8| around.hashes.of_face(i, star[i].corners[usize::from(face)]);
+            sort_entries(&mut self.order, hash);
         }
         for (at, &entry) in self.order.iter().enumerate() {
             let (i, face) = parts(entry);
@@ -494,153 +619,44 @@ impl StarCode {
     }
 }
 
-/// Finds the choices for a tetrahedron, given the forest children of its corners.
-#[inline]
-fn rank_tet(choices: &mut Choices, lists: &[&[ForestChild]; 4], corners: &[[i32; 3]; 4]) {
-    let count: usize = lists.iter().map(|list| list.len()).sum();
-    let [p, q, r, s] = corners;
-    let sum = |k: usize| i64::from(p[k]) + i64::from(q[k]) + i64::from(r[k]) + i64::from(s[k]);
-    let sums = [sum(0), sum(1), sum(2)];
-    let mut next = [0; 4];
-    let (mut len, mut left) = (0, 1.0);
-    while len < count.min(RANKED) && left >= LEFT {
-        let Some((corner, child)) = pop_least(lists, &mut next) else { break };
-        let share = share(child.offset, sums, corners[usize::from(corner) & 3]);
-        let (weight, place) = (left * share, next[usize::from(corner) & 3] - 1);
-        choices.all[len] = Choice { weight, first_weight: weight, remover: child.update, place, corner };
-        len += 1;
-        left *= 1.0 - share;
+/// How much more likely a candidate is that removes a neighbour, and how much less one that leaves it: a power of 2, so that weights are
+/// exact whatever the order of the neighbours.
+const AGREEMENT: f64 = 8.0;
+
+/// By how many neighbours that it removes, less those that it leaves, from −4 on.
+const FACTORS: [f64; 9] = {
+    let mut factors = [1.0; 9];
+    let mut i = 0;
+    while i < 4 {
+        factors[5 + i] = factors[4 + i] * AGREEMENT;
+        factors[3 - i] = factors[4 - i] / AGREEMENT;
+        i += 1;
     }
-    let remover = if count > len { FURTHER } else { NONE };
-    choices.all[len] = Choice { weight: left, first_weight: left, remover, ..Choice::default() };
-    choices.len = len + 1;
-}
+    factors
+};
 
-/// How much more likely a candidate is that removes a neighbour, and how much less one that leaves it.
-const AGREEMENT: f64 = 6.0;
-
-/// Weighs the choices for a tetrahedron again by the removers of its neighbours in the star: T_u is connected.
+/// Weighs the choices for a tetrahedron again by the removers of its neighbours in the star, as far as these are known: T_u is connected.
+/// Returns the first of those with the largest weight.
 #[inline]
-fn weigh_by_neighbors(choices: &mut [Choice], new: &NewTet, star: &[NewTet], decided: &[bool]) {
-    let (mut known, mut count) = ([(0, NONE); 4], 0);
-    for (face, &n) in (0..).zip(&new.across) {
-        if decided.get(usize::from(n)).is_some_and(|&decided| decided) {
-            known[count] = (face, star[usize::from(n)].remover);
-            count += 1;
-        }
+fn weigh_by_neighbors(choices: &[Choice], weights: &mut [f64], known: [u32; 4]) -> usize {
+    let last = choices.len().saturating_sub(1);
+    let (mut first, mut largest) = (0, f64::NEG_INFINITY);
+    for (i, (choice, weight)) in choices.iter().zip(weights).enumerate() {
+        let same = known.map(|other| u32::from(other == choice.remover));
+        // What is removed later than the candidate, or never, was left by it.
+        let left = known.map(|other| u32::from(other > choice.remover));
+        let factor = 4 + same.iter().sum::<u32>() - left.iter().sum::<u32>();
+        // What is left is no candidate.
+        *weight *= if i == last { 1.0 } else { FACTORS[factor as usize % FACTORS.len()] };
+        // Which is larger is a coin toss for the processor.
+        let is_larger = usize::from(*weight > largest).wrapping_neg();
+        (first, largest) = (i & is_larger | first & !is_larger, larger(*weight, largest));
     }
-    if count == 0 {
-        return;
-    }
-    for choice in choices.iter_mut().filter(|choice| choice.remover < FURTHER) {
-        for &(_, other) in known[..count].iter().filter(|&&(face, _)| face != choice.corner) {
-            // What is removed later than the candidate, or never, was left by it.
-            if other == choice.remover {
-                choice.weight *= AGREEMENT;
-            } else if other > choice.remover {
-                choice.weight /= AGREEMENT;
-            }
-        }
-    }
-}
-
-/// Whether predicates can be asked about a point.
-fn on_lattice(p: [i32; 3]) -> bool {
-    p.iter().all(|&x| (0..=1 << crate::geom::WIDE_BITS).contains(&x))
-}
-
-/// The next update of four ascending lists, merged, and which list it is of.
-#[inline]
-fn pop_least(lists: &[&[ForestChild]; 4], next: &mut [u32; 4]) -> Option<(u8, ForestChild)> {
-    let mut least: Option<(u8, &ForestChild)> = None;
-    for (k, list) in (0..).zip(lists) {
-        if let Some(child) = list.get(next[usize::from(k)] as usize)
-            && least.is_none_or(|(_, other)| child.update < other.update)
-        {
-            least = Some((k, child));
-        }
-    }
-    let (k, &child) = least?;
-    next[usize::from(k)] += 1;
-    Some((k, child))
-}
-
-/// How likely a candidate removes a tetrahedron that no earlier one has removed, given its offset, the sum of the corners, and
-/// its near vertex.
-#[inline]
-fn share(offset: [i32; 3], sum: [i64; 3], at: [i32; 3]) -> f64 {
-    let to = [f64::from(offset[0]), f64::from(offset[1]), f64::from(offset[2])];
-    let apart = |k: usize| (sum[k] - 4 * i64::from(at[k])) as f64;
-    let centre = [apart(0), apart(1), apart(2)];
-    let lengths = (dot(centre, centre) * dot(to, to)).sqrt();
-    let cosine = dot(centre, to) / lengths.max(1e-300);
-    let ratio = ((1.0 - cosine) / (1.0 + cosine).max(1e-9)).min(1e9);
-    1.0 / (1.0 + ratio * ratio)
-}
-
-#[inline]
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    first
 }
 
 /// Faces over which the new vertex lies at a larger sine than this are guessed to stay.
 const STEEP: f64 = 0.35;
-
-/// A new vertex, seen from the near vertex of a tetrahedron.
-struct View {
-    corners: [[i32; 3]; 4],
-    near: usize,
-    /// Where the new vertex lies; none if it lies off every lattice.
-    point: Option<[i32; 3]>,
-    /// From the near vertex to the new one.
-    to: [f64; 3],
-    /// From the near vertex to each corner.
-    apart: [[f64; 3]; 4],
-    /// Whether determinants of these are exact.
-    exact: bool,
-}
-
-impl View {
-    #[inline]
-    fn new(corners: &[[i32; 3]; 4], near: usize, offset: [i32; 3]) -> Self {
-        let from = corners[near];
-        let add = |k: usize| from[k].saturating_add(offset[k]);
-        let point = Some([add(0), add(1), add(2)]).filter(|&point| on_lattice(point));
-        let mut apart = [[0.0; 3]; 4];
-        let mut largest = offset.iter().fold(0, |m, x| m | x.unsigned_abs());
-        for (apart, corner) in apart.iter_mut().zip(corners) {
-            for k in 0..3 {
-                let d = corner[k] - from[k];
-                largest |= d.unsigned_abs();
-                apart[k] = f64::from(d);
-            }
-        }
-        let to = [f64::from(offset[0]), f64::from(offset[1]), f64::from(offset[2])];
-        // Components below 2^16 make minors below 2^33 and sums of three products below 2^51.
-        Self { corners: *corners, near, point, to, apart, exact: largest < 1 << 16 }
-    }
-
-    /// The sine of the angle at which the new vertex lies over a face at the near vertex; none if it does not lie over it, or
-    /// off every lattice.
-    #[inline]
-    fn elevation(&self, face: usize) -> Option<f64> {
-        let point = self.point?;
-        // In this order the normal of the face points into the tetrahedron.
-        let [_, _, i, j] = TURN[(4 * self.near + face) % 16].map(|corner| corner as usize & 3);
-        let (a, b) = (self.apart[i], self.apart[j]);
-        let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-        let height = dot(normal, self.to);
-        let is_over = if self.exact {
-            height > 0.0
-        } else {
-            let mut with = self.corners;
-            with[face] = point;
-            orient3d(with[0], with[1], with[2], with[3]) > 0
-        };
-        let lengths = (dot(normal, normal) * dot(self.to, self.to)).sqrt();
-        is_over.then(|| height.abs() / lengths.max(1e-300))
-    }
-}
 
 /// What removes the stars of updates that have been applied, so that it need not be predicted again.
 #[derive(Clone, Debug)]
@@ -669,8 +685,7 @@ impl KnownStars {
         (self.starts.bytes() + size_of_val(&self.bytes[..])) as u64
     }
 
-    /// Enters what is known of the star of `u`, which is in canonical order; false if nothing is.
-    #[inline]
+    /// Enters what is known of the star of `u`, which has been hashed; false if nothing is.
     pub fn recall(&self, u: u32, scratch: &mut Scratch) -> bool {
         let Some(record) = self.starts.get(u).checked_sub(1).and_then(|at| self.bytes.get(at as usize..))
         else {
@@ -684,22 +699,29 @@ impl KnownStars {
             *known = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
         }
         known[FEW] = NONE;
-        let Scratch { star, sorted, .. } = scratch;
-        for (&mark, &place) in marks.iter().zip(&*sorted) {
-            let new = &mut star[place as usize % MOST];
+        let Scratch { star, hashes, .. } = scratch;
+        for (&mark, place) in marks.iter().zip(in_order(hashes.tets.iter().copied())) {
+            let new = &mut star[place % MOST];
             (new.remover, new.inner) = (known[usize::from(mark & 15)], mark >> 4);
         }
         true
     }
 
-    /// Takes note of the star of `u`, which is in canonical order.
-    pub fn keep(&mut self, u: u32, scratch: &Scratch) {
+    /// Takes note of the star of `u`, unless that is known: these are its tetrahedra.
+    pub fn keep(&mut self, u: u32, star: &[u32], mesh: &CurrentMesh) {
+        if self.starts.get(u) > 0 {
+            return;
+        }
         let first = self.bytes.len();
         let Ok(start) = u32::try_from(first + 1) else { return };
         let (mut known, mut count) = ([NONE; FEW], 0);
         self.bytes.push(0);
-        for &place in &scratch.sorted {
-            let NewTet { remover, inner, .. } = scratch.star[place as usize % MOST];
+        let hash = |v: u32| spread(mesh.vertex(v).0);
+        let hashes =
+            star.iter().map(|&t| mesh.tets[t as usize].map(hash).into_iter().fold(0, u64::wrapping_add));
+        for place in in_order(hashes) {
+            let t = star[place];
+            let (remover, inner) = (mesh.tag(t), mesh.tet_byte(t));
             let at = match remover {
                 NONE => FEW,
                 _ => known[..count].iter().position(|&other| other == remover).unwrap_or(count),
@@ -727,6 +749,14 @@ impl KnownStars {
             *self = Self::default();
         }
     }
+}
+
+/// The places of the tetrahedra of a star in canonical order: that of their hashes.
+fn in_order(hashes: impl Iterator<Item = u64>) -> impl Iterator<Item = usize> {
+    const PLACE: u64 = MOST as u64 - 1;
+    let mut sorted: ArrayVec<u64, MOST> = (0..).zip(hashes).map(|(i, hash)| hash & !PLACE | i).collect();
+    sorted.sort_unstable();
+    sorted.into_iter().map(|entry| (entry & PLACE) as usize)
 }
 
 /// Bytes of a known star, as a rule.

@@ -131,10 +131,10 @@ impl CurrentMesh {
         number_once(&mut self.marks[t as usize], self.epoch, number)
     }
 
-    /// The number that tetrahedron `t` has got since [`Self::next_epoch`], if it has one.
+    /// The number that tetrahedron `t` has got since [`Self::next_epoch`], if it has one; [`NONE`] has none.
     #[inline]
     pub(in crate::mt) fn tet_number(&self, t: u32) -> Option<u32> {
-        let mark = self.marks[t as usize];
+        let mark = *self.marks.get(t as usize)?;
         (mark >> MARK_BITS == self.epoch).then_some(mark & MARK_MASK)
     }
 
@@ -247,11 +247,10 @@ impl CurrentMesh {
 #[inline]
 fn number_once(own: &mut u32, epoch: u32, number: u32) -> Option<u32> {
     let mark = epoch << MARK_BITS;
-    if *own & !MARK_MASK == mark {
-        return Some(*own & MARK_MASK);
-    }
-    *own = mark | number;
-    None
+    let known = *own & !MARK_MASK == mark;
+    // Which it is is a coin toss for the processor: the mark is written anyway.
+    *own = if known { *own } else { mark | number };
+    known.then_some(*own & MARK_MASK)
 }
 
 #[cfg(test)]

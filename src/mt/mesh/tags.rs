@@ -61,6 +61,19 @@ impl CurrentMesh {
         }
     }
 
+    /// Nothing is found for a tag any more.
+    #[inline]
+    pub(in crate::mt) fn forget_place(&mut self, tag: u32) {
+        self.place_of.set(tag, NONE);
+    }
+
+    /// As [`Self::set_tag`], for a tetrahedron that is not found for its tag so far.
+    #[inline]
+    pub(in crate::mt) fn set_new_tag(&mut self, t: u32, tag: u32) {
+        self.tags[t as usize] = tag;
+        self.place_tag(t);
+    }
+
     /// Gives tetrahedron `t` a tag that is not looked for, although it is below [`FIRST_ANONYMOUS_TAG`], in the place of one that is
     /// not.
     #[inline]

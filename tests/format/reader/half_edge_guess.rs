@@ -28,7 +28,7 @@ enum Choice {
 /// The removers that a tetrahedron can have.
 struct Choices {
     candidates: Vec<Candidate>,
-    /// In order, with their weights.
+    /// With their weights.
     choices: Vec<(Choice, f64)>,
 }
 
@@ -84,7 +84,7 @@ fn removers(vertices: &Vertices, star: &[Tet], record: &Record) -> Vec<Option<u3
     let mut removers: Vec<Option<Option<u32>>> =
         choices.iter().map(|choices| (choices.choices.len() == 1).then_some(None)).collect();
     let mut order: Vec<usize> = (0..star.len()).filter(|&t| removers[t].is_none()).collect();
-    order.sort_by_key(|&t| key(choices[t].choices[0].1, hash_of(star[t])));
+    order.sort_by_key(|&t| key(choices[t].largest(), hash_of(star[t])));
     let mut symbols = record.symbols.iter().copied();
     let mut next = || symbols.next().unwrap_or(0);
     for t in order {
@@ -92,10 +92,10 @@ fn removers(vertices: &Vertices, star: &[Tet], record: &Record) -> Vec<Option<u3
         for (choice, weight) in weighed {
             let Choice::Update(place) = *choice else { continue };
             let candidate = candidates[place];
-            for corner in (0..4).filter(|&corner| corner != candidate.corner) {
+            for corner in 0..4 {
                 match behind(star, t, corner).and_then(|other| removers[other]) {
-                    Some(Some(other)) if other == candidate.child.update => *weight *= 6.0,
-                    Some(other) if is_later(other, candidate.child.update) => *weight /= 6.0,
+                    Some(Some(other)) if other == candidate.child.update => *weight *= 8.0,
+                    Some(other) if is_later(other, candidate.child.update) => *weight /= 8.0,
                     _ => {}
                 }
             }
@@ -125,9 +125,11 @@ impl Choices {
         }
         let is_all = choices.len() == candidates.len();
         choices.push((if is_all { Choice::None } else { Choice::Further }, left));
-        let mut choices = Self { candidates, choices };
-        choices.sort();
-        choices
+        Self { candidates, choices }
+    }
+
+    fn largest(&self) -> f64 {
+        self.choices.iter().map(|choice| choice.1).fold(0.0, f64::max)
     }
 
     fn sort(&mut self) {
@@ -162,9 +164,8 @@ impl Candidate {
             (all - 4 * i64::from(corners[self.corner][axis])) as f64
         });
         let offset = self.child.offset.map(f64::from);
-        let cos = dot(g, offset) / (dot(g, g) * dot(offset, offset)).sqrt().max(1e-300);
-        let r = ((1.0 - cos) / (1.0 + cos).max(1e-9)).min(1e9);
-        1.0 / (1.0 + r * r)
+        let (a, b) = (dot(g, g) * dot(offset, offset), dot(g, offset));
+        0.5 + a.sqrt() * b / (a + b * b).max(1e-300)
     }
 }
 
