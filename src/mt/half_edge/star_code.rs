@@ -277,7 +277,7 @@ impl HalfEdgeMt {
             let label = if corner == NEW { vertex } else { mesh.vertex(link[usize::from(corner)]) };
             later(self.children_of(label), u)
         };
-        let around = Around { link_len: *link_len, places, hashes, children };
+        let around = Around { link_len: *link_len, places, hashes, children: &children };
         code.run(&around, &mut star[..*star_len], &mut Reader { symbols, bits, at: 0 })
     }
 }
@@ -305,7 +305,7 @@ impl StarCode {
             let label = if corner == NEW { Some(vertex) } else { link.clone().nth(usize::from(corner)) };
             label.map_or(&[][..], |label| later(children(label), u))
         };
-        let around = Around { link_len: link.len(), places, hashes: &hashes, children };
+        let around = Around { link_len: link.len(), places, hashes: &hashes, children: &children };
         let mut writer = Writer { truth: &truth, symbols, bits };
         let done = self.run(&around, star, &mut writer).and_then(|()| writer.finish(out));
         (symbols, bits) = (writer.symbols, writer.bits);
@@ -315,12 +315,7 @@ impl StarCode {
     }
 
     /// Finds what removes the tetrahedra of a star.
-    fn run<'a>(
-        &mut self,
-        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
-        star: &mut [NewTet],
-        io: &mut impl CodeIo,
-    ) -> Option<()> {
+    fn run<'a>(&mut self, around: &Around<'_, 'a>, star: &mut [NewTet], io: &mut dyn CodeIo) -> Option<()> {
         star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
         let mut lists = Lists::new();
         self.find_children(around, &mut lists);
@@ -364,12 +359,12 @@ fn later(children: &[ForestChild], u: UpdateId) -> &[ForestChild] {
 }
 
 /// What surrounds a new vertex.
-struct Around<'a, F> {
+struct Around<'s, 'a> {
     link_len: usize,
-    places: &'a Places,
-    hashes: &'a Hashes,
+    places: &'s Places,
+    hashes: &'s Hashes,
     /// The forest children of a vertex that come later, by its corner.
-    children: F,
+    children: &'s dyn Fn(u8) -> &'a [ForestChild],
 }
 
 /// Levels of certainty.
@@ -389,9 +384,18 @@ fn parts(entry: u64) -> (usize, u8) {
 
 /// Sorts entries, given the hashes of tetrahedra and faces.
 fn sort_entries(entries: &mut [u64], hash: impl Fn(usize, u8) -> u64) {
-    if sort_by_first_bits(entries).is_none() {
-        let whole = |&entry: &u64| (entry >> 52, hash(parts(entry).0, parts(entry).1 & 3) >> 12, entry);
-        entries.sort_by_key(whole);
+    if sort_by_first_bits(entries).is_some() {
+        return;
+    }
+    entries.sort_unstable();
+    // Those that are equal but for tetrahedra and faces are neighbours now: whole hashes decide, and few entries move.
+    let whole = |entry: u64| (entry >> 52, hash(parts(entry).0, parts(entry).1 & 3) >> 12, entry);
+    for i in 1..entries.len() {
+        let mut at = i;
+        while at > 0 && whole(entries[at]) < whole(entries[at - 1]) {
+            entries.swap(at, at - 1);
+            at -= 1;
+        }
     }
 }
 
@@ -423,11 +427,7 @@ fn rank_of(choice: usize, weights: &[f64]) -> usize {
 
 impl StarCode {
     /// Finds the forest children that come later at the vertices of the star; where there are none, there is no list.
-    fn find_children<'a>(
-        &mut self,
-        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
-        lists: &mut Lists<'a>,
-    ) {
+    fn find_children<'a>(&mut self, around: &Around<'_, 'a>, lists: &mut Lists<'a>) {
         for near in (0..around.link_len as u8).chain([NEW]) {
             let children = (around.children)(near);
             self.counts[usize::from(near)] = children.len() as u32;
@@ -503,9 +503,9 @@ impl StarCode {
 
     fn find_removers<'a>(
         &mut self,
-        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
+        around: &Around<'_, 'a>,
         star: &mut [NewTet],
-        io: &mut impl CodeIo,
+        io: &mut dyn CodeIo,
     ) -> Option<()> {
         self.order.clear();
         for (i, choices) in self.choices[..star.len()].iter().enumerate() {
@@ -539,10 +539,10 @@ impl StarCode {
     #[cold]
     fn further<'a>(
         &mut self,
-        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
+        around: &Around<'_, 'a>,
         new: &NewTet,
         i: usize,
-        io: &mut impl CodeIo,
+        io: &mut dyn CodeIo,
     ) -> Option<u16> {
         let mut rest = new.corners.map(|corner| Later::new(corner, (around.children)(corner)));
         // All choices but the last have a rank.
@@ -567,12 +567,7 @@ impl StarCode {
         Some(self.candidates.len() as u16 - 1)
     }
 
-    fn find_inner<'a>(
-        &mut self,
-        around: &Around<'_, impl Fn(u8) -> &'a [ForestChild]>,
-        star: &mut [NewTet],
-        io: &mut impl CodeIo,
-    ) {
+    fn find_inner<'a>(&mut self, around: &Around<'_, 'a>, star: &mut [NewTet], io: &mut dyn CodeIo) {
         self.order.clear();
         // Those that are not stored are as predicted.
         let bits = io.bits_left();
@@ -761,3 +756,25 @@ fn in_order(hashes: impl Iterator<Item = u64>) -> impl Iterator<Item = usize> {
 
 /// Bytes of a known star, as a rule.
 const USUAL: usize = 40;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Few or many, and with hashes that differ in their last bits alone.
+    #[test]
+    fn entries_are_in_the_order_of_their_certainty_and_whole_hashes() {
+        for (count, shift) in [(1, 0), (9, 50), (9, 20), (20, 36), (20, 12), (33, 50), (100, 36), (100, 12)] {
+            let hashes: Vec<u64> = (0..count).map(|i| spread(i) >> shift).collect();
+            let certainty = |i: usize| [0.25, 0.5, 0.75][i % 3];
+            let hash = |i: usize, face: u8| hashes[i].wrapping_add(u64::from(face) << 12);
+            let all = || (0..hashes.len()).flat_map(|i| [(i, 0), (i, 3)]);
+            let mut entries: Vec<u64> =
+                all().map(|(i, face)| entry(certainty(i), hash(i, face), i, face)).collect();
+            sort_entries(&mut entries, hash);
+            let mut expected: Vec<(usize, u8)> = all().collect();
+            expected.sort_by_key(|&(i, face)| (i % 3, hash(i, face) >> 12, i, face));
+            assert_eq!(entries.into_iter().map(parts).collect::<Vec<_>>(), expected, "{count}, {shift}");
+        }
+    }
+}
