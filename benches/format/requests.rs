@@ -2,7 +2,7 @@
 
 use super::Result;
 use super::mt_file::mt_file;
-use super::network::{Network, Visitor};
+use super::network::{Network, Protocol, Visitor};
 use super::sets::Set;
 use super::surfaces::{Interpolant, Mesh, Surface};
 use std::io::Cursor;
@@ -183,7 +183,7 @@ const BOXES: [(&str, f64, f64, f64); 5] = [
 ];
 
 /// A link from afar: 20 Mbit/s on each connection.
-const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0 };
+const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0, protocol: Protocol::Http1 };
 
 fn asked(set: &Set, field: &FieldInfo) -> Vec<(&'static str, Request)> {
     let whole = Bounds::of(&set.mesh.positions);
