@@ -8,7 +8,7 @@ use std::sync::{Arc, LazyLock};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::{Bounds, Camera};
 use tetralod::mesh::TetMesh;
-use tetralod::refine::{Custom, Need, Region, Request, Transfer, View};
+use tetralod::refine::{Criterion, Custom, Inside, Need, Region, Request, TetData, Transfer, View};
 use tetralod::session::Session;
 use tetralod::stream::LoaderOptions;
 use tetralod_build::{BuildConfig, build};
@@ -186,23 +186,38 @@ fn budgets_fetch_what_they_have_room_for() {
     }
 }
 
-/// What only a caller's function can tell is found step by step.
+/// What only a caller's function can tell is found step by step, unless it says in which box it asks for something.
 #[test]
 fn requests_of_the_callers_own_have_their_mesh_too() {
-    let (_, file) = &FILES[0];
-    let left = || {
-        Arc::new(Custom::new(|tet| {
-            let is_left = tet.corners.iter().any(|corner| corner[0] < 1000);
-            if is_left { tet.error.error() / 0.001 } else { 0.0 }
-        }))
-    };
-    let request = Request::within(0.3);
-    let mut whole = Session::new();
-    whole.feed(file).expect("a sound file");
-    whole.request_with(&request, &[left()]).expect("a sensible request");
-    whole.step(&mut |_| true).expect("a sound file");
-    let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
-    visitor.open();
-    visitor.refine_with(&request, &[left()]).expect("a sensible request");
-    assert_eq!(visitor.session.hash(), whole.hash());
+    for (what, file) in FILES.iter() {
+        let mut whole = Session::new();
+        whole.feed(file).expect("a sound file");
+        let info = whole.info().expect("a file that is open").clone();
+        let bounds = whole.bounds().expect("a file that is open");
+        let half = (0.5 * f64::from(1_u32 << info.lattice.bits)) as i32;
+        let left = move || {
+            Custom::new(move |tet: &TetData<'_>| {
+                let is_left = tet.corners.iter().any(|corner| corner[0] < half);
+                if is_left { tet.error.error() / 0.001 } else { 0.0 }
+            })
+        };
+        let at = |part: f64| [0, 1, 2].map(|i| bounds.min[i] + part * (bounds.max[i] - bounds.min[i]));
+        let low = Bounds { min: at(0.0), max: at(0.3) };
+        let limited: Arc<dyn Criterion> = Arc::new(Inside::new(left(), low, info.lattice));
+        let free: Arc<dyn Criterion> = Arc::new(left());
+        let mut applied = Vec::new();
+        for (criterion, most_rounds) in [(limited, 1), (free, u32::MAX)] {
+            let request = Request::within(0.3);
+            let custom = [criterion];
+            whole.request_with(&request, &custom).expect("a sensible request");
+            applied.push(whole.step(&mut |_| true).expect("a sound file").applied);
+            let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
+            visitor.open();
+            let cost = visitor.refine_with(&request, &custom).expect("a sensible request");
+            assert_eq!(visitor.session.hash(), whole.hash(), "{what}, {custom:?}");
+            assert_eq!(visitor.session.block_progress().missed, 0, "{what}, {custom:?}");
+            assert!(cost.rounds <= most_rounds && cost.repeated == 0, "{what}, {custom:?}: {cost:?}");
+        }
+        assert!(applied[0] < applied[1], "{what}: {applied:?}");
+    }
 }
