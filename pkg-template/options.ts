@@ -98,6 +98,11 @@ export interface RefineOptions extends Need {
    * thread (`worker: false`); otherwise the URL of a module whose default export is the function.
    */
   where?: Where | string | URL;
+  /**
+   * The function of `where` is asked of tetrahedra alone whose own boxes meet this one, as of `box`; the mesh is not refined for it elsewhere.
+   * Of a file that is fetched in parts, all blocks that it can need are then fetched at once, not step by step.
+   */
+  whereBox?: NonNullable<Need["box"]>;
   /** The mesh may have at most so many tetrahedra; the error is then as small as that allows. Default: no limit. */
   maxTets?: number;
   /** At most so many vertices. Default: no limit. */

@@ -1,5 +1,5 @@
 //! What MT files cost: bytes beside other forms of the same meshes, what requests need of them by ranges, and a model larger
-//! than the memory for it. Prints Markdown; `cargo xtask bench --format` puts it together as docs/benchmarks.md.
+//! than the memory for it. Prints Markdown; `cargo xtask bench --format` and `--network` put it into docs/benchmarks.md.
 
 // The slow and plain isosurface of the tests says how near a surface is to the exact one.
 #[path = "../../tests/support/surfaces.rs"]
@@ -9,6 +9,7 @@ mod surfaces;
 #[path = "../../tests/support/network.rs"]
 mod network;
 
+mod first_picture;
 mod mt_file;
 mod requests;
 mod sets;
@@ -25,7 +26,8 @@ fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["table", inputs @ ..] => table::run(&sets::all(inputs)?),
-        ["requests", inputs @ ..] => requests::run(&sets::all(inputs)?),
+        ["first-picture", inputs @ ..] => first_picture::run(&sets::all(inputs)?),
+        ["requests", inputs @ ..] => requests::run(inputs),
         ["walk", file] => walk::run(file.as_ref()),
         ["make", size, kind, file] => sets::make(size.parse()?, kind, file.as_ref()),
         // `cargo test --all-targets` runs it without any.

@@ -1,228 +1,115 @@
-//! How much of a file requests need: the first useful picture, and a box at full resolution.
+//! What requests cost over a network.
 
 use super::Result;
-use super::mt_file::mt_file;
-use super::network::{Network, Visitor};
-use super::sets::Set;
-use super::surfaces::{Interpolant, Mesh, Surface};
-use std::io::Cursor;
-use tetralod::format::DecodeOptions;
+use super::mt_file::{mt_file, percent_of};
+use super::network::{Cost, Network, Protocol, Visitor};
+use super::sets;
+use std::fs;
+use std::path::Path;
 use tetralod::geom::Bounds;
-use tetralod::mt::{FieldInfo, MtKind};
-use tetralod::refine::{Need, RefineStats, Request};
-use tetralod::session::{Client, Session};
-use tetralod::stream::{FileSource, LoaderOptions};
+use tetralod::mt::{MtInfo, MtKind};
+use tetralod::refine::{Need, Request};
+use tetralod::stream::LoaderOptions;
 use tetralod_build::Purpose;
-
-/// Fewest tetrahedra of a set whose first picture is measured.
-const LARGE: usize = 150_000;
-/// First pictures of sets of more tetrahedra are not measured.
-const HUGE: usize = 6_000_000;
 
 /// What half-edge MTs, which come in blocks, are built for.
 const WAYS: [(&str, Purpose); 2] =
     [("half-edge", Purpose::Uniform), ("half-edge for regions", Purpose::Regions)];
 
-/// Shares of the file, in percent, after which a prefix is looked at.
-const LADDER: [f64; 12] = [1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 75.0, 100.0];
-
-type Reader = Client<FileSource<Cursor<Vec<u8>>>>;
-
-pub fn run(sets: &[Set]) -> Result<()> {
-    let mut pictures = Vec::new();
-    let mut asked = Vec::new();
-    for set in sets {
-        for (name, purpose) in WAYS {
-            let is_usual = purpose == Purpose::default();
-            // Presets are compared on what is generated.
-            if !is_usual && set.bytes.is_some() {
-                continue;
-            }
-            let name = format!("{}, {name}", set.name);
-            eprintln!("{name}");
-            let file = mt_file(&set.mesh, MtKind::HalfEdge, purpose)?;
-            if is_usual && (LARGE..=HUGE).contains(&set.mesh.tets.len()) {
-                pictures.push(picture(set, &name, &file)?);
-            }
-            asked.extend(requests(set, &name, &file)?);
-        }
-    }
-    println!(
-        "| set | file KB | prefix: guaranteed % | prefix: measured % | error % | Hausdorff % | ranges: guaranteed % | error % | Hausdorff % |"
-    );
-    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
-    pictures.iter().for_each(|row| println!("{row}"));
-    println!("\n## Over a network\n");
-    println!(
-        "| set | request | updates applied % | blocks fetched % | file sent % | rounds | requests | sent twice % | missed | s | whole file s |"
-    );
-    println!("|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
-    asked.iter().for_each(|row| println!("{row}"));
-    Ok(())
-}
-
-fn open(file: &[u8]) -> Result<Reader> {
-    Ok(Client::open(FileSource::new(Cursor::new(file.to_vec()))?, DecodeOptions::default(), u64::MAX)?)
-}
-
-/// The isosurface at the middle value, and what it is held against.
-struct Reference {
-    mesh: Mesh,
-    surface: Surface,
-    iso: f64,
-    range: f64,
-    diagonal: f64,
-}
-
-/// Percent of the range of the field, and of the diagonal.
-#[derive(Clone, Copy)]
-struct Accuracy {
-    field: f64,
-    distance: f64,
-}
-
-impl Reference {
-    fn of(session: &Session, diagonal: f64) -> Result<Self> {
-        let (info, mesh) = (session.info().ok_or("no MT")?, session.mesh().ok_or("no mesh")?);
-        let mesh = Mesh::of(info, mesh);
-        let field = &info.fields[0];
-        let iso = 0.5 * (field.min + field.max);
-        Ok(Self { surface: Surface::of(&mesh, iso), mesh, iso, range: field.range(), diagonal })
-    }
-
-    /// The distance of both surfaces from each other, and the error of the field: by how much it is on the wrong side of the
-    /// isovalue at the ends of an edge that the reference surface crosses.
-    fn compare(&self, session: &Session) -> Result<Accuracy> {
-        let (info, mesh) = (session.info().ok_or("no MT")?, session.mesh().ok_or("no mesh")?);
-        let mesh = Mesh::of(info, mesh);
-        let surface = Surface::of(&mesh, self.iso);
-        let values = Interpolant::new(&mesh);
-        let mut field = 0.0_f64;
-        for edge in &self.surface.edges {
-            let [low, high] = edge.map(|v| values.at(self.mesh.positions[v as usize]));
-            let above = low.map_or(0.0, |low| low - self.iso);
-            field = field.max(above).max(high.map_or(0.0, |high| self.iso - high));
-        }
-        let distance = surface.distance_to(&self.surface).max(self.surface.distance_to(&surface));
-        Ok(Accuracy { field: 100.0 * field / self.range, distance: 100.0 * distance / self.diagonal })
-    }
-}
-
-fn percent_of(part: u64, file: &[u8]) -> f64 {
-    100.0 * part as f64 / file.len() as f64
-}
-
-fn picture(set: &Set, name: &str, file: &[u8]) -> Result<String> {
-    let mut whole = Session::new();
-    whole.feed(file)?;
-    whole.refine(&Request::within(0.0))?;
-    let reference = Reference::of(&whole, Bounds::of(&set.mesh.positions).diagonal())?;
-    let request: Request = Need::within(0.01).around(0, &[reference.iso]).into();
-    let least = whole.refine(&request)?;
-    let mut client = open(file)?;
-    let stats = client.refine(&request)?;
-    assert!(stats.satisfied && client.session().hash() == whole.hash(), "the same mesh by ranges");
-    let ranges = percent_of(client.session().fetched(), file);
-    let exact = reference.compare(client.session())?;
-    let (guaranteed, measured) = in_order(file, &request, &reference, &least)?;
-    let measured = measured.map_or("– | – | –".to_owned(), |(share, found)| {
-        format!("{share:.0} | {:.2} | {:.2}", found.field, found.distance)
-    });
-    Ok(format!(
-        "| {name} | {} | {guaranteed:.1} | {measured} | {ranges:.1} | {:.2} | {:.2} |",
-        file.len() / 1000,
-        exact.field,
-        exact.distance
-    ))
-}
-
-/// How much of the file has to be read in its order until the mesh is that of the request, and until both distances are
-/// measured to be within 1 %, at the steps of the ladder.
-fn in_order(
-    file: &[u8],
-    request: &Request,
-    reference: &Reference,
-    least: &RefineStats,
-) -> Result<(f64, Option<(f64, Accuracy)>)> {
-    let mut session = Session::new();
-    let mut measured = None;
-    let mut guaranteed = None;
-    // In steps of a quarter of a percent.
-    let step = file.len() / 400 + 1;
-    for (at, piece) in file.chunks(step).enumerate() {
-        session.feed(piece)?;
-        let share = percent_of((at * step + piece.len()) as u64, file);
-        if session.mesh().is_none() {
-            continue;
-        }
-        let stats = session.refine(request)?;
-        if guaranteed.is_none() && stats.applied == least.applied {
-            guaranteed = Some(share);
-        }
-        let before = percent_of((at * step) as u64, file);
-        if measured.is_none() && LADDER.iter().any(|&rung| before < rung && share >= rung - 1e-9) {
-            let found = reference.compare(&session)?;
-            if found.field <= 1.0 && found.distance <= 1.0 {
-                measured = Some((share, found));
-            }
-        }
-        if let (Some(guaranteed), Some(_)) = (guaranteed, measured) {
-            return Ok((guaranteed, measured));
-        }
-    }
-    Ok((guaranteed.ok_or("the whole file does not give the mesh of the request")?, measured))
-}
-
 /// Boxes that meet the model: a name, where they begin and how long they are along each side, and the error inside.
-const BOXES: [(&str, f64, f64, f64); 5] = [
+const BOXES: [(&str, f64, f64, f64); 6] = [
     ("box, low", 0.1, 0.25, 0.0),
     ("box, middle", 0.375, 0.25, 0.0),
     ("box, high", 0.65, 0.25, 0.0),
+    ("box, middle, 0.1 %", 0.375, 0.25, 0.001),
     ("box, middle, 1 %", 0.375, 0.25, 0.01),
     ("box, corner, 1 %", 0.0, 0.05, 0.01),
 ];
 
 /// A link from afar: 20 Mbit/s on each connection.
-const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0 };
+const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0, protocol: Protocol::Http1 };
 
-fn asked(set: &Set, field: &FieldInfo) -> Vec<(&'static str, Request)> {
-    let whole = Bounds::of(&set.mesh.positions);
-    let at = |part: f64| [0, 1, 2].map(|i| whole.min[i] + part * (whole.max[i] - whole.min[i]));
-    let boxes = BOXES.map(|(name, part, side, error)| {
-        let region = Bounds { min: at(part), max: at(part + side) };
-        (name, Need::within(error).inside(region).into())
-    });
-    let value = 0.5 * (field.min + field.max);
-    let surface = |error| Need::within(error).around(0, &[value]).into();
-    let others =
-        [("isosurface, 1 %", surface(0.01)), ("isosurface", surface(0.0)), ("1 %", Request::within(0.01))];
-    boxes.into_iter().chain(others).collect()
+/// What takes longest beside the rest of the file, once that is open.
+struct Slowest {
+    ratio: f64,
+    case: String,
 }
 
-/// What each request needs, and costs over the network.
-fn requests(set: &Set, set_name: &str, file: &[u8]) -> Result<Vec<String>> {
-    let mut rows = Vec::new();
-    let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
-    let opened = visitor.open();
-    let info = visitor.session.info().ok_or("no MT")?.clone();
-    let whole = (NETWORK.latency_ms + file.len() as f64 / NETWORK.bytes_per_ms) / 1000.0;
-    for (name, request) in asked(set, &info.fields[0]) {
+pub fn run(inputs: &[&str]) -> Result<()> {
+    println!(
+        "| set | request | updates applied % | blocks fetched % | file sent % | rounds | requests | sent twice % | missed | s | s, HTTP/2 | whole file s |"
+    );
+    println!("|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    let mut slowest = Slowest { ratio: 0.0, case: String::new() };
+    for &input in inputs {
+        if input.ends_with(".mt") {
+            let name = Path::new(input).file_stem().ok_or("a file without a name")?;
+            rows(&name.to_string_lossy(), &fs::read(input)?, &mut slowest)?;
+            continue;
+        }
+        for set in sets::all(&[input])? {
+            // Presets are compared on what is generated.
+            let ways = if set.bytes.is_some() { &WAYS[..1] } else { &WAYS };
+            for (way, purpose) in ways {
+                let file = mt_file(&set.mesh, MtKind::HalfEdge, *purpose)?;
+                rows(&format!("{}, {way}", set.name), &file, &mut slowest)?;
+            }
+        }
+    }
+    println!(
+        "\nOnce the file is open, no request takes more than {:.2} times as long as the rest of the file on one connection; that is {}.",
+        slowest.ratio, slowest.case
+    );
+    Ok(())
+}
+
+/// Prints what each request needs of a file, and costs over the network.
+fn rows(set: &str, file: &[u8], slowest: &mut Slowest) -> Result<()> {
+    eprintln!("{set}");
+    let mut first = Visitor::new(file, NETWORK, LoaderOptions::default());
+    first.open();
+    let info = first.session.info().ok_or("no MT")?;
+    let bounds = first.session.bounds().ok_or("no MT")?;
+    let seconds = |bytes: u64| (NETWORK.latency_ms + bytes as f64 / NETWORK.bytes_per_ms) / 1000.0;
+    for (name, request) in requests(&bounds, info) {
         let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
-        visitor.open();
+        let opened = visitor.open();
         let cost = visitor.refine(&request)?;
+        let ratio = cost.seconds / seconds(file.len() as u64 - opened.bytes);
+        if ratio > slowest.ratio {
+            *slowest = Slowest { ratio, case: format!("{name} of {set}") };
+        }
+        let mut other =
+            Visitor::new(file, Network { protocol: Protocol::Http2, ..NETWORK }, LoaderOptions::default());
+        let both = |one: Cost, two: Cost| one.seconds + two.seconds;
+        let by_streams = both(other.open(), other.refine(&request)?);
         let progress = visitor.session.block_progress();
-        let applied = visitor.stats.applied;
-        rows.push(format!(
-            "| {set_name} | {name} | {:.1} | {:.1} | {:.1} | {} | {} | {:.1} | {} | {:.2} | {whole:.2} |",
-            100.0 * f64::from(applied) / f64::from(info.updates.max(1)),
+        println!(
+            "| {set} | {name} | {:.1} | {:.1} | {:.1} | {} | {} | {:.1} | {} | {:.2} | {by_streams:.2} | {:.2} |",
+            100.0 * f64::from(visitor.stats.applied) / f64::from(info.updates.max(1)),
             100.0 * f64::from(progress.here) / f64::from(progress.blocks.max(1)),
             percent_of(opened.bytes + cost.bytes, file),
             opened.rounds + cost.rounds,
             opened.requests + cost.requests,
             percent_of(cost.repeated, file),
             progress.missed,
-            opened.seconds + cost.seconds,
-        ));
+            both(opened, cost),
+            seconds(file.len() as u64),
+        );
     }
-    Ok(rows)
+    Ok(())
+}
+
+fn requests(whole: &Bounds, info: &MtInfo) -> Vec<(&'static str, Request)> {
+    let at = |part: f64| [0, 1, 2].map(|i| whole.min[i] + part * (whole.max[i] - whole.min[i]));
+    let boxes = BOXES.map(|(name, part, side, error)| {
+        let region = Bounds { min: at(part), max: at(part + side) };
+        (name, Need::within(error).inside(region).into())
+    });
+    let field = &info.fields[0];
+    let value = 0.5 * (field.min + field.max);
+    let surface = |error| Need::within(error).around(0, &[value]).into();
+    let others =
+        [("isosurface, 1 %", surface(0.01)), ("isosurface", surface(0.0)), ("1 %", Request::within(0.01))];
+    boxes.into_iter().chain(others).collect()
 }

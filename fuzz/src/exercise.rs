@@ -88,10 +88,16 @@ fn pieces<'a>(script: &'a [u8; SCRIPT], mut file: &'a [u8]) -> impl Iterator<Ite
     })
 }
 
-/// Opens a file, takes its blocks in the order of the script, and refines while they come and go.
+/// Opens a file, takes its blocks in the order of the script, and refines while they come and go; then lets a session plan what it
+/// needs of it.
 pub fn index(input: &[u8]) {
     let Some((script, file)) = with_script(input) else { return };
     let file = repaired(file);
+    come_and_go(script, &file);
+    plan(script, &file);
+}
+
+fn come_and_go(script: &[u8; SCRIPT], file: &[u8]) {
     let mut decoder =
         Decoder::new(DecodeOptions { limits: limits(), in_parts: true, ..DecodeOptions::default() });
     for piece in file.chunks(64) {
@@ -109,7 +115,7 @@ pub fn index(input: &[u8]) {
         if byte & 0xC0 == 0xC0 {
             leave(&mut decoder, &mut front, block);
         } else {
-            arrive(&mut decoder, &mut front, block, &file);
+            arrive(&mut decoder, &mut front, block, file);
         }
         let Some(mt) = decoder.mt() else { return };
         let criterion = LodCriterion::new(mt.info(), &request(byte, mt.info()));
@@ -118,13 +124,40 @@ pub fn index(input: &[u8]) {
     }
 }
 
+/// A session in parts that has little memory, is asked for something, and gets some of what it wants for that. Whatever the index says, what
+/// it wants comes to an end, and nothing comes in vain.
+fn plan(script: &[u8; SCRIPT], file: &[u8]) {
+    let options = DecodeOptions { limits: limits(), ..DecodeOptions::default() };
+    let mut session = Session::in_parts(options, u64::from(script[0]) << 10);
+    for (at, &byte) in script.iter().cycle().take(2 * SCRIPT).enumerate() {
+        for _ in 0..if at < SCRIPT { 1 + byte % 8 } else { u8::MAX } {
+            let wanted = session.wanted();
+            let Some(next) = wanted.get(usize::from(byte) % wanted.len().max(1)) else { break };
+            let range = &next.range;
+            assert!(range.start < range.end);
+            if session.take(range, part(file, range)).is_err() {
+                break;
+            }
+            assert!(
+                session.wanted().iter().all(|wanted| wanted.range != *range),
+                "what has come is not wanted again"
+            );
+        }
+        ask(&mut session, byte);
+        let progress = session.block_progress();
+        assert!(progress.here <= progress.blocks && progress.needed <= progress.blocks);
+    }
+}
+
+/// The bytes of a range, as far as the file has them.
+fn part<'a>(file: &'a [u8], range: &std::ops::Range<u64>) -> &'a [u8] {
+    let place = |x: u64| usize::try_from(x).unwrap_or(usize::MAX).min(file.len());
+    &file[place(range.start)..place(range.end)]
+}
+
 fn arrive(decoder: &mut Decoder, front: &mut Front, block: u32, file: &[u8]) {
     let ranges = decoder.block_ranges(block);
-    let part = |range: &std::ops::Range<u64>| {
-        let place = |x: u64| usize::try_from(x).unwrap_or(usize::MAX).min(file.len());
-        &file[place(range.start)..place(range.end)]
-    };
-    let bytes: Vec<u8> = ranges.iter().flat_map(part).copied().collect();
+    let bytes: Vec<u8> = ranges.iter().flat_map(|range| part(file, range)).copied().collect();
     let before = decoder.mt().map(|mt| mt.present());
     match decoder.take_block(block, &bytes) {
         Ok(()) => {

@@ -69,7 +69,7 @@ mod uniform;
 pub use criterion::{ANY, COMPONENTS, Tolerance};
 pub use criterion::{BlockData, Criterion, TetData, Verdict};
 #[doc(hidden)]
-pub use custom::Custom;
+pub use custom::{Custom, Inside};
 #[doc(hidden)]
 pub use front::{Front, GoOn, Outcome};
 #[doc(hidden)]

@@ -208,6 +208,18 @@ for (const [kind, worker] of Object.keys(blocks).flatMap(
       mt.free();
     });
 
+    test("what a module asks for in a box comes in one round", async () => {
+      const where = `data:text/javascript,${encodeURIComponent("export default ({ errors }) => errors.map((error) => error / 0.01);")}`;
+      const mt = await open();
+      const { rounds } = mt.progress.traffic;
+      await mt.refine({ where, whereBox: REQUESTS[0].box });
+      const { traffic, blocks } = mt.progress;
+      assert.ok(blocks.needed > 0 && blocks.here < blocks.all, JSON.stringify(blocks));
+      assert.equal(blocks.missed, 0);
+      assert.equal(traffic.rounds - rounds, 1);
+      mt.free();
+    });
+
     test("another request replaces the one before, and what only that needed is cancelled", async () => {
       const mt = await open();
       let closed = 0;

@@ -185,6 +185,7 @@ for (const worker of [true, false]) {
         [{ maxVertices: 0 }, "maxVertices"],
         [{ maxBytes: "many" }, "maxBytes"],
         [{ where: 7 }, "where"],
+        [{ whereBox: [0, 0, 0, 1, 1, 1] }, "whereBox"],
         [{ error: "%" }, "error"],
         [{ error: "1" }, "error"],
       ]) {

@@ -2,19 +2,20 @@
 //! no byte comes twice.
 
 use crate::support::meshes::{bent, blocks, hilly, linear};
-use crate::support::network::{Network, Visitor};
+use crate::support::network::{Network, Protocol, Visitor};
 use crate::support::random::Random;
 use std::sync::{Arc, LazyLock};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::{Bounds, Camera};
 use tetralod::mesh::TetMesh;
-use tetralod::refine::{Custom, Need, Region, Request, Transfer, View};
+use tetralod::refine::{Criterion, Custom, Inside, Need, Region, Request, TetData, Transfer, View};
 use tetralod::session::Session;
 use tetralod::stream::LoaderOptions;
 use tetralod_build::{BuildConfig, build};
 use tetralod_io::generate;
 
-const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0 };
+const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0, protocol: Protocol::Http1 };
+const NETWORKS: [Network; 2] = [NETWORK, Network { protocol: Protocol::Http2, ..NETWORK }];
 
 /// A half-edge file in many blocks.
 fn file(mesh: &TetMesh) -> Vec<u8> {
@@ -85,14 +86,15 @@ fn one_look_at_the_index_gives_all_that_a_request_needs() {
         whole.feed(file).expect("a sound file");
         let opened = Visitor::new(file, NETWORK, LoaderOptions::default()).open();
         assert!(opened.rounds <= 2, "{what}: {opened:?}");
+        let cases = [(NETWORK, Some(0)), (NETWORK, Some(1000)), (NETWORK, None), (NETWORKS[1], None)];
         for (name, request) in requests(&whole) {
             whole.refine(&request).expect("a sensible request");
-            for gap in [Some(0), Some(1000), None] {
+            for (network, gap) in cases {
                 let options = LoaderOptions { gap, ..LoaderOptions::default() };
-                let mut visitor = Visitor::new(file, NETWORK, options);
+                let mut visitor = Visitor::new(file, network, options);
                 visitor.open();
                 let cost = visitor.refine(&request).expect("a sensible request");
-                let case = format!("{what}, {name}, gap {gap:?}: {cost:?}");
+                let case = format!("{what}, {name}, gap {gap:?}, {:?}: {cost:?}", network.protocol);
                 assert_eq!(visitor.session.hash(), whole.hash(), "{case}");
                 assert_eq!(visitor.session.block_progress().missed, 0, "{case}");
                 assert!(cost.rounds <= 1 && cost.repeated == 0, "{case}");
@@ -105,17 +107,19 @@ fn one_look_at_the_index_gives_all_that_a_request_needs() {
 /// network is like.
 #[test]
 fn no_request_takes_longer_than_the_rest_of_the_file() {
-    let networks = [(5.0, 500.0), (40.0, 2500.0), (300.0, 1000.0), (300.0, 20_000.0)];
+    let paces = [(5.0, 500.0), (40.0, 2500.0), (300.0, 1000.0), (300.0, 20_000.0)];
+    let networks = paces.into_iter().flat_map(|(latency_ms, bytes_per_ms)| {
+        NETWORKS.map(|network| Network { latency_ms, bytes_per_ms, ..network })
+    });
     for (what, file) in FILES.iter() {
         let mut whole = Session::new();
         whole.feed(file).expect("a sound file");
-        for (latency_ms, bytes_per_ms) in networks {
-            let network = Network { latency_ms, bytes_per_ms };
+        for network in networks.clone() {
             for (name, request) in requests(&whole) {
                 let mut visitor = Visitor::new(file, network, LoaderOptions::default());
                 let rest = file.len() as u64 - visitor.open().bytes;
                 let cost = visitor.refine(&request).expect("a sensible request");
-                let streamed = (latency_ms + rest as f64 / bytes_per_ms) / 1000.0;
+                let streamed = (network.latency_ms + rest as f64 / network.bytes_per_ms) / 1000.0;
                 assert!(
                     cost.seconds <= 1.05 * streamed,
                     "{what}, {name}, {network:?}: {cost:?} for {streamed}"
@@ -128,11 +132,11 @@ fn no_request_takes_longer_than_the_rest_of_the_file() {
 /// The same for one request after the other, each of which leaves blocks behind.
 #[test]
 fn no_byte_comes_twice() {
-    for (what, file) in FILES.iter() {
+    for ((what, file), network) in FILES.iter().flat_map(|file| NETWORKS.map(|network| (file, network))) {
         let mut whole = Session::new();
         whole.feed(file).expect("a sound file");
         let mut visitor =
-            Visitor::new(file, NETWORK, LoaderOptions { gap: Some(700), ..LoaderOptions::default() });
+            Visitor::new(file, network, LoaderOptions { gap: Some(700), ..LoaderOptions::default() });
         let mut bytes = visitor.open().bytes;
         for (name, request) in requests(&whole).into_iter().rev() {
             whole.refine(&request).expect("a sensible request");
@@ -146,6 +150,21 @@ fn no_byte_comes_twice() {
     }
 }
 
+/// Streams of one connection share what it brings: many are no faster than one, where as many connections are.
+#[test]
+fn streams_share_their_connection() {
+    for (what, file) in FILES.iter() {
+        let [apart, together] = NETWORKS.map(|network| {
+            let mut visitor = Visitor::new(file, network, LoaderOptions::default());
+            visitor.open();
+            visitor.refine(&Request::within(0.0)).expect("a sensible request")
+        });
+        let alone = (NETWORK.latency_ms + together.bytes as f64 / NETWORK.bytes_per_ms) / 1000.0;
+        assert!(together.requests > 1 && together.seconds >= alone - 1e-9, "{what}: {together:?}, {alone}");
+        assert!(apart.bytes == together.bytes && apart.seconds < alone, "{what}: {apart:?}, {alone}");
+    }
+}
+
 /// A budget is for what has the largest errors: little is fetched beyond what it has room for.
 #[test]
 fn budgets_fetch_what_they_have_room_for() {
@@ -153,7 +172,7 @@ fn budgets_fetch_what_they_have_room_for() {
     let mut whole = Session::new();
     whole.feed(file).expect("a sound file");
     for budget in [5000, 15_000, 40_000] {
-        for request in [Request::within(0.0), Need::within(0.0).around(0, &[128.0]).into()] {
+        for request in [Request::within(0.0), Need::within(0.0).around(0, &[0.5]).into()] {
             let request: Request = request.at_most(budget);
             whole.refine(&request).expect("a sensible request");
             let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
@@ -167,23 +186,38 @@ fn budgets_fetch_what_they_have_room_for() {
     }
 }
 
-/// What only a caller's function can tell is found step by step.
+/// What only a caller's function can tell is found step by step, unless it says in which box it asks for something.
 #[test]
 fn requests_of_the_callers_own_have_their_mesh_too() {
-    let (_, file) = &FILES[0];
-    let left = || {
-        Arc::new(Custom::new(|tet| {
-            let is_left = tet.corners.iter().any(|corner| corner[0] < 1000);
-            if is_left { tet.error.error() / 0.001 } else { 0.0 }
-        }))
-    };
-    let request = Request::within(0.3);
-    let mut whole = Session::new();
-    whole.feed(file).expect("a sound file");
-    whole.request_with(&request, &[left()]).expect("a sensible request");
-    whole.step(&mut |_| true).expect("a sound file");
-    let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
-    visitor.open();
-    visitor.refine_with(&request, &[left()]).expect("a sensible request");
-    assert_eq!(visitor.session.hash(), whole.hash());
+    for (what, file) in FILES.iter() {
+        let mut whole = Session::new();
+        whole.feed(file).expect("a sound file");
+        let info = whole.info().expect("a file that is open").clone();
+        let bounds = whole.bounds().expect("a file that is open");
+        let half = (0.5 * f64::from(1_u32 << info.lattice.bits)) as i32;
+        let left = move || {
+            Custom::new(move |tet: &TetData<'_>| {
+                let is_left = tet.corners.iter().any(|corner| corner[0] < half);
+                if is_left { tet.error.error() / 0.001 } else { 0.0 }
+            })
+        };
+        let at = |part: f64| [0, 1, 2].map(|i| bounds.min[i] + part * (bounds.max[i] - bounds.min[i]));
+        let low = Bounds { min: at(0.0), max: at(0.3) };
+        let limited: Arc<dyn Criterion> = Arc::new(Inside::new(left(), low, info.lattice));
+        let free: Arc<dyn Criterion> = Arc::new(left());
+        let mut applied = Vec::new();
+        for (criterion, most_rounds) in [(limited, 1), (free, u32::MAX)] {
+            let request = Request::within(0.3);
+            let custom = [criterion];
+            whole.request_with(&request, &custom).expect("a sensible request");
+            applied.push(whole.step(&mut |_| true).expect("a sound file").applied);
+            let mut visitor = Visitor::new(file, NETWORK, LoaderOptions::default());
+            visitor.open();
+            let cost = visitor.refine_with(&request, &custom).expect("a sensible request");
+            assert_eq!(visitor.session.hash(), whole.hash(), "{what}, {custom:?}");
+            assert_eq!(visitor.session.block_progress().missed, 0, "{what}, {custom:?}");
+            assert!(cost.rounds <= most_rounds && cost.repeated == 0, "{what}, {custom:?}: {cost:?}");
+        }
+        assert!(applied[0] < applied[1], "{what}: {applied:?}");
+    }
 }

@@ -14,9 +14,23 @@ pub struct Network {
     pub latency_ms: f64,
     /// What a connection brings in a millisecond.
     pub bytes_per_ms: f64,
+    /// What connections there are.
+    pub protocol: Protocol,
 }
 
-/// What bytes come at a time.
+/// How requests come by a connection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Protocol {
+    /// HTTP/1.1: each request has one of its own.
+    Http1,
+    /// HTTP/2: all requests are streams of one, which brings of each what is due in turn.
+    Http2,
+}
+
+/// Requests at a time by HTTP/2, as soon as an answer shows that it is that: as in pages.
+const STREAMS: usize = 24;
+
+/// What bytes come at a time: a frame of HTTP/2.
 const CHUNK: u64 = 16 << 10;
 
 /// What a request has cost.
@@ -50,6 +64,8 @@ pub struct Visitor<'a> {
     file: &'a [u8],
     answers: Vec<Answer>,
     now: f64,
+    /// When the connection that all requests have in common has brought what it has begun.
+    free_from: f64,
     rounds: u32,
 }
 
@@ -65,6 +81,7 @@ impl<'a> Visitor<'a> {
             file,
             answers: Vec::new(),
             now: 0.0,
+            free_from: 0.0,
             rounds: 0,
         }
     }
@@ -107,24 +124,33 @@ impl<'a> Visitor<'a> {
         let answer = &mut self.answers[next];
         self.now = self.now.max(answer.due);
         let (now, id, part) = (self.now as u64, answer.id, answer.rest.clone());
-        if answer.is_headed {
-            let part = part.start..part.end.min(part.start + CHUNK);
-            answer.rest.start = part.end;
-            if answer.rest.is_empty() {
-                self.answers.swap_remove(next);
-            } else {
-                let bytes = (answer.rest.end - answer.rest.start).min(CHUNK);
-                answer.due = self.now + bytes as f64 / self.network.bytes_per_ms;
-            }
-            self.loader.data(id, now, &self.file[part.start as usize..part.end as usize]);
+        let chunk = if answer.is_headed {
+            part.start..part.end.min(part.start + CHUNK)
         } else {
-            answer.is_headed = true;
-            answer.due += (part.end - part.start).min(CHUNK) as f64 / self.network.bytes_per_ms;
-            let content_range = format!("bytes {}-{}/{}", part.start, part.end - 1, self.file.len());
-            let content_length = Some(part.end - part.start);
-            let content_range = Some(&content_range[..]);
-            let head = ResponseHead { status: 206, content_range, content_length, ..ResponseHead::default() };
-            self.loader.head(id, now, &head);
+            part.start..part.start
+        };
+        answer.rest.start = chunk.end;
+        let was_headed = std::mem::replace(&mut answer.is_headed, true);
+        if answer.rest.is_empty() {
+            self.answers.swap_remove(next);
+        } else {
+            let shares = self.network.protocol == Protocol::Http2;
+            let begins = if shares { self.now.max(self.free_from) } else { self.now };
+            let bytes = (part.end - chunk.end).min(CHUNK);
+            answer.due = begins + bytes as f64 / self.network.bytes_per_ms;
+            self.free_from = answer.due;
+        }
+        if was_headed {
+            self.loader.data(id, now, &self.file[chunk.start as usize..chunk.end as usize]);
+            return;
+        }
+        let content_range = format!("bytes {}-{}/{}", part.start, part.end - 1, self.file.len());
+        let content_length = Some(part.end - part.start);
+        let content_range = Some(&content_range[..]);
+        let head = ResponseHead { status: 206, content_range, content_length, ..ResponseHead::default() };
+        self.loader.head(id, now, &head);
+        if self.network.protocol == Protocol::Http2 {
+            self.loader.set_max_requests(STREAMS);
         }
     }
 

@@ -1,4 +1,5 @@
-//! `cargo xtask bench --format`: what MT files cost and what requests need of them; writes `docs/benchmarks.md`.
+//! `cargo xtask bench --format`: what MT files and first pictures cost, and a model larger than the memory for it; writes its part of
+//! `docs/benchmarks.md`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,16 +9,16 @@ use anyhow::{Context, Result};
 use crate::benchmarks_page::{self, Part};
 use crate::shell;
 
-/// Generated volumes in the tables, by points along a side, those of which only requests are measured, and that of the walk.
+/// Generated volumes in the tables, by points along a side, that of which only the first picture is measured, and that of the walk.
 const SIZES: [u32; 2] = [33, 65];
-const LARGER: [u32; 2] = [97, 129];
+const LARGER: u32 = 97;
 const WALKED: u32 = 97;
 
 const HEAD: &str = "\
 # Benchmarks
 
 Written by `cargo xtask bench --all`, over the data sets in the folder that `TETRALOD_DATA` names and generated volumes; its parts
-also by commands of their own: files and requests by `bench --format`, the others by those that they name. Bytes and tetrahedra are
+also by commands of their own: files, first pictures and the walk by `bench --format`, the others by those that they name. Bytes and tetrahedra are
 the same on every machine; speeds are of the machine that it ran on.
 
 ## Bytes
@@ -41,16 +42,6 @@ diagonal) are measured to be at most 1 %; both are told beside it. The goal is 5
 
 ";
 
-const NETWORK: &str = "\
-Over a link with 40 ms from asking to the first byte and 20 Mbit/s on each of six connections, in the time of that link, without the
-time that the engine takes. Boxes of a quarter of each side, a 64th of the box around the model, with error 0, and in the middle with 1 % of
-the range; one of a twentieth of each side in the lowest corner, in generated volumes a place where nothing varies; isosurfaces at the
-middle value. The share of the updates that are applied is what the partial order makes necessary: no way to cut the file into blocks can
-do with less. *rounds*: how often something is asked for while nothing is on its way, opening the file included, which takes one or two.
-*missed*: blocks that the mesh needed though the index says that it cannot. *whole file*: how long it takes on one connection.
-
-";
-
 const WALK: &str = "
 ## A model ten times as large as the room
 
@@ -67,25 +58,25 @@ pub fn run() -> Result<()> {
         inputs.push(folder.display().to_string());
     }
     let table = bench("table", &inputs)?;
-    let larger = LARGER.iter().map(|size| format!("bucky:{size}"));
-    let requests = bench("requests", &inputs.into_iter().chain(larger).collect::<Vec<_>>())?;
-    let requests = requests.replace("## Over a network\n\n", &format!("## Over a network\n\n{NETWORK}"));
+    inputs.push(format!("bucky:{LARGER}"));
+    let pictures = bench("first-picture", &inputs)?;
     fs::create_dir_all("target/bench")?;
     let file = Path::new("target/bench").join(format!("bucky{WALKED}-half-edge.mt"));
     bench("make", &[WALKED.to_string(), "half-edge".to_owned(), absolute(&file)?])?;
     // A process of its own, for its memory is measured.
     let walk = bench("walk", &[absolute(&file)?])?;
     let walk = format!("The generated volume of {WALKED}³ points, kind half-edge.\n\n{walk}\n");
-    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &walk].concat();
+    let page = [HEAD, "\n", &table, PICTURE, &pictures, WALK, &walk].concat();
     benchmarks_page::write(Part::Files, &page)
 }
 
 /// Cargo runs benchmarks in the folder of their package.
-fn absolute(path: &Path) -> Result<String> {
+pub fn absolute(path: &Path) -> Result<String> {
     Ok(shell::root().join(path).to_str().context("the folder has a name that is not UTF-8")?.to_owned())
 }
 
-fn bench(what: &str, arguments: &[String]) -> Result<String> {
+/// What a benchmark of files prints.
+pub fn bench(what: &str, arguments: &[String]) -> Result<String> {
     let mut command = shell::cargo(["bench", "--package", "tetralod", "--bench", "format", "--", what]);
     shell::output(command.args(arguments))
 }

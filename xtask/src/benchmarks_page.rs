@@ -11,6 +11,7 @@ const PAGE: &str = "docs/benchmarks.md";
 pub enum Part {
     /// What comes before the first title of another part.
     Files,
+    Network,
     Builds,
     AgainstVtk,
     FirstVisit,
@@ -18,7 +19,8 @@ pub enum Part {
 }
 
 /// How the parts begin, but for the first one.
-const TITLES: [&str; 4] = [
+const TITLES: [&str; 5] = [
+    "\n## Over a network\n",
     "\n## Builds\n",
     "\n## Beside VTK's decimation\n",
     "\n## The first visit of the page\n",

@@ -9,6 +9,7 @@ mod bench_build;
 mod bench_first_visit;
 mod bench_format;
 mod bench_kinds;
+mod bench_network;
 mod bench_pictures;
 mod benchmarks_page;
 mod browser;
@@ -51,7 +52,8 @@ usage: cargo xtask COMMAND
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
   bench --kinds [--large]        measure triangulation, insertion and the kinds of MT side by side
   bench --all                    measure all of the following: writes docs/benchmarks.md and docs/beside-vtk.md. Takes hours
-  bench --format                 measure MT files and what requests need of them
+  bench --format                 measure MT files and what first pictures need of them
+  bench --network [SET...]       measure what requests cost over a network; a SET is a file or bucky:N
   bench --build [SIZE...]        measure builds of grids with SIZE³ points, whole and in parts, beside VTK's decimation
   bench --against-vtk [SET...]   measure meshes of equal size by VTK's decimation of tetrahedra, which comes from PyPI
   bench --first-visit            measure how soon the demo's page shows what

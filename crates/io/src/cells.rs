@@ -3,13 +3,16 @@
 //! Cells with a volume are split by the recipes of `cell_shapes`; those without one (vertices, lines, polygons), which
 //! meshers write beside them for boundaries, are left out. What cannot be split is refused, counted by type.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::MemoryLimit;
 use crate::cell_shapes::{PYRAMID_14, Recipe, middles, recipe};
 use crate::cell_types::{ANY_ORDER, ANY_ORDERS, GHOST, HIDDEN, TETRAHEDRON, VERTICES, is_flat};
 use crate::error::{ReadReason, cell_name, names};
 use crate::ghosts::{GHOST_CELL, HIDDEN_CELL};
+use crate::number::NumberType;
 use tetralod::mesh::{BitSet, CellNumbers, Field, MeshInput};
 
 /// Cells of any order that are those of another type: type, points, and that one.
@@ -79,8 +82,9 @@ pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
 
 fn counts_of(types: &[i64]) -> BTreeMap<i64, u64> {
     let mut counts = BTreeMap::new();
-    for kind in types {
-        *counts.entry(*kind).or_insert(0_u64) += 1;
+    // Most files have long runs of one type.
+    for run in types.chunk_by(|a, b| a == b) {
+        *counts.entry(run[0]).or_insert(0_u64) += run.len() as u64;
     }
     counts
 }
@@ -101,13 +105,24 @@ pub(super) fn leave_out(types: &[i64], input: &mut MeshInput) {
 /// The points of a cell in the middle of corners, with these.
 type Middles = Vec<(u8, &'static [u8])>;
 
-/// Recipes that were looked up, and middles.
+/// Recipes that were looked up, and middles, by type; and the place of the last one, for most cells are of the type of the one before.
 #[derive(Default)]
-struct Recipes(BTreeMap<i64, Option<(Recipe, Middles)>>);
+struct Recipes {
+    places: BTreeMap<i64, usize>,
+    known: Vec<(i64, Option<(Recipe, Middles)>)>,
+    last: usize,
+}
 
 impl Recipes {
     fn of(&mut self, kind: i64) -> Option<&(Recipe, Middles)> {
-        self.0.entry(kind).or_insert_with(|| recipe(kind).map(|recipe| (recipe, middles(kind)))).as_ref()
+        if self.known.get(self.last).is_none_or(|(last, _)| *last != kind) {
+            let next = self.known.len();
+            self.last = *self.places.entry(kind).or_insert(next);
+            if self.last == next {
+                self.known.push((kind, recipe(kind).map(|recipe| (recipe, middles(kind)))));
+            }
+        }
+        self.known[self.last].1.as_ref()
     }
 }
 
@@ -133,8 +148,8 @@ impl Numbering {
             Self::From { first, .. } => u32::try_from(p).ok().and_then(|p| p.checked_add(*first)),
             Self::Each(numbers) => numbers.get(p).copied(),
         });
-        let points = self.points() as u64;
-        number.ok_or(ReadReason::MissingPoint { cell: cell as u64, point, points })
+        let points = || self.points() as u64;
+        number.ok_or_else(|| ReadReason::MissingPoint { cell: cell as u64, point, points: points() })
     }
 }
 
@@ -209,16 +224,71 @@ fn runs(types: &[i64]) -> Vec<(u32, &'static str)> {
     runs
 }
 
+/// The points of cells, one cell after the other.
+#[derive(Debug)]
+pub(super) enum Indices<'a> {
+    Listed(Vec<i64>),
+    /// Integers as a file has them. In a large file they are most of it, and are decoded a few at a time.
+    Stored {
+        bytes: Cow<'a, [u8]>,
+        number: NumberType,
+        big: bool,
+    },
+}
+
+impl Default for Indices<'_> {
+    fn default() -> Self {
+        Self::Listed(Vec::new())
+    }
+}
+
+impl Indices<'_> {
+    /// Those of a range, as far as there are so many.
+    pub fn part(&self, range: Range<usize>) -> Cow<'_, [i64]> {
+        let clipped = |len: usize| range.start.min(len)..range.end.min(len).max(range.start.min(len));
+        match self {
+            Self::Listed(list) => Cow::Borrowed(&list[clipped(list.len())]),
+            Self::Stored { bytes, number, big } => {
+                let Range { start, end } = clipped(bytes.len() / number.size());
+                let bytes = &bytes[start * number.size()..end * number.size()];
+                Cow::Owned(number.integers(bytes, *big).unwrap_or_default())
+            }
+        }
+    }
+
+    fn all(&self) -> Cow<'_, [i64]> {
+        self.part(0..usize::MAX)
+    }
+
+    pub fn to_mut(&mut self) -> &mut Vec<i64> {
+        if let Self::Stored { .. } = self {
+            *self = Self::Listed(self.all().into_owned());
+        }
+        match self {
+            Self::Listed(list) => list,
+            Self::Stored { .. } => unreachable!("just replaced"),
+        }
+    }
+}
+
+/// Cells whose points are decoded at a time.
+const BATCH: usize = 1 << 11;
+
 /// Cells as a file lists them, whose ends were checked.
 #[derive(Debug, Default)]
-pub(super) struct CellList {
+pub(super) struct CellList<'a> {
     pub types: Vec<i64>,
     /// Where the points of each cell end in the list of all.
     pub ends: Vec<i64>,
-    pub connectivity: Vec<i64>,
+    pub connectivity: Indices<'a>,
 }
 
-impl CellList {
+/// Where a cell ends; where none can if it is negative.
+fn end_of(end: &i64) -> usize {
+    usize::try_from(*end).unwrap_or(usize::MAX)
+}
+
+impl CellList<'_> {
     /// Splits the cells, and drops them.
     pub fn split(self, numbering: &Numbering, memory: &MemoryLimit) -> Result<Split, ReadReason> {
         let Self { types, ends, connectivity } = &self;
@@ -237,9 +307,14 @@ impl CellList {
         split.tets.reserve_exact(room);
         let (mut start, mut recipes) = (0, Recipes::default());
         let (mut vertices, mut known) = (Vec::new(), BitSet::default());
-        for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
-            let end = usize::try_from(end).unwrap_or(usize::MAX);
-            let listed = connectivity.get(start..end);
+        let (mut points, mut begun) = (Cow::default(), 0);
+        for (cell, (&kind, end)) in types.iter().zip(ends).enumerate() {
+            if cell % BATCH == 0 {
+                let last = &ends[cell..ends.len().min(cell + BATCH)];
+                (points, begun) = (connectivity.part(start..last.last().map_or(start, end_of)), start);
+            }
+            let end = end_of(end);
+            let listed = end.checked_sub(begun).and_then(|end| points.get(start - begun..end));
             let listed = listed.ok_or_else(|| ReadReason::Missing(format!("a point of cell {cell}")))?;
             start = end;
             let first = split.tets.len();
@@ -271,19 +346,19 @@ impl CellList {
     /// Which of so many points cells with a volume use.
     pub fn used(&self, points: usize) -> Vec<bool> {
         let mut used = vec![false; points];
-        for (_, listed) in self.solid() {
+        for (_, listed) in self.solid(&self.connectivity.all()) {
             let listed = listed.iter().filter_map(|&point| usize::try_from(point).ok());
             listed.for_each(|point| used.get_mut(point).into_iter().for_each(|used| *used = true));
         }
         used
     }
 
-    /// The cells that have a volume: their numbers and points.
-    fn solid(&self) -> impl Iterator<Item = (usize, &[i64])> {
+    /// The cells that have a volume: their numbers and, of these of all, points.
+    fn solid<'a>(&self, points: &'a [i64]) -> impl Iterator<Item = (usize, &'a [i64])> {
         let mut start = 0;
-        let cells = self.types.iter().zip(&self.ends).enumerate().map(move |(cell, (&kind, &end))| {
-            let end = usize::try_from(end).unwrap_or(usize::MAX);
-            let listed = self.connectivity.get(start..end).unwrap_or_default();
+        let cells = self.types.iter().zip(&self.ends).enumerate().map(move |(cell, (&kind, end))| {
+            let end = end_of(end);
+            let listed = points.get(start..end).unwrap_or_default();
             start = end;
             (cell, kind, listed)
         });
@@ -301,9 +376,12 @@ impl CellList {
     /// another one.
     pub fn order_as_before_9(&mut self, cells: Vec<bool>) {
         let mut start = 0;
-        for (swapped, &end) in cells.into_iter().zip(&self.ends) {
-            let end = usize::try_from(end).unwrap_or(usize::MAX);
-            if let Some(points @ [_, .., _]) = self.connectivity.get_mut(start..end)
+        if !cells.contains(&true) {
+            return;
+        }
+        for (swapped, end) in cells.into_iter().zip(&self.ends) {
+            let end = end_of(end);
+            if let Some(points @ [_, .., _]) = self.connectivity.to_mut().get_mut(start..end)
                 && swapped
                 && points.len() == 27
             {
@@ -318,8 +396,12 @@ impl CellList {
         let is_hidden = |point: &i64| {
             usize::try_from(*point).ok().and_then(|p| hidden.get(p)).is_some_and(|hidden| *hidden)
         };
-        let cells: Vec<usize> =
-            self.solid().filter(|(_, listed)| listed.iter().any(is_hidden)).map(|(cell, _)| cell).collect();
+        let points = self.connectivity.all();
+        let cells: Vec<usize> = self
+            .solid(&points)
+            .filter(|(_, listed)| listed.iter().any(is_hidden))
+            .map(|(cell, _)| cell)
+            .collect();
         cells.into_iter().for_each(|cell| self.types[cell] = HIDDEN);
     }
 }
@@ -338,6 +420,7 @@ mod tests {
         let connectivity: Vec<i64> = (0..3).chain(0..4).chain(0..8).collect();
         let ends = [3, 7, 15];
         assert_eq!(checked_ends(&types, &ends), Ok(15));
+        let connectivity = Indices::Listed(connectivity);
         let cells = CellList { types: types.to_vec(), ends: ends.to_vec(), connectivity };
         let split = cells.split(&numbering(8), &MemoryLimit::default()).unwrap();
         assert_eq!((split.tets.len(), split.tets[0]), (7, [100, 101, 102, 103]));
@@ -373,7 +456,8 @@ mod tests {
         assert!(flat.contains("cell 0, a vertex, has 4 points, not 1"), "{flat}");
         assert!(wrong(&[4, i64::MIN]).contains("before it begins"));
         let split = |connectivity: &[i64]| {
-            let cells = CellList { types: vec![10], ends: vec![4], connectivity: connectivity.to_vec() };
+            let connectivity = Indices::Listed(connectivity.to_vec());
+            let cells = CellList { types: vec![10], ends: vec![4], connectivity };
             cells.split(&numbering(4), &MemoryLimit::default())
         };
         let missing = |point| split(&[0, 1, 2, point]).unwrap_err();

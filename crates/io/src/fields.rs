@@ -174,7 +174,13 @@ impl<'a> Collector<'a> {
         integer: bool,
         unit: &str,
     ) -> Result<(), ReadReason> {
-        let Claim { fields, components, wanted } = claim;
+        let Claim { mut fields, components, wanted } = claim;
+        if let ([field], 1) = (&mut fields[..], components) {
+            self.memory.take(8 * values.len() as u64)?;
+            self.fields.push(Field { unit: unit.to_owned(), integer, values, ..std::mem::take(field) });
+            self.last += 1;
+            return Ok(());
+        }
         let _held = self.memory.hold(8 * values.len() as u64)?;
         for (c, (mut field, _)) in
             fields.into_iter().zip(wanted).enumerate().filter(|(_, (_, wanted))| *wanted)
@@ -305,7 +311,7 @@ pub(super) fn in_order(values: &[f64], components: usize, order: &[usize]) -> Ve
 
 /// One component of values that have so many each, one value after the other.
 pub(super) fn component_of(values: &[f64], component: usize, components: usize) -> Vec<f64> {
-    values.iter().skip(component).step_by(components).copied().collect()
+    values.chunks_exact(components).map(|tuple| tuple[component]).collect()
 }
 
 /// What a component of so many is called.

@@ -4,7 +4,7 @@
 //! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
 //! offsets and connectivity, older ones as counts followed by indices.
 
-use crate::cells::{CellList, Numbering};
+use crate::cells::{CellList, Indices, Numbering};
 use crate::error::{At, ReadError, ReadReason, expect_count, shown};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
@@ -602,7 +602,7 @@ impl<'a> Body<'a> {
     }
 
     /// The mesh of these points and cells, of which one has values that were read.
-    fn mesh(mut self, positions: Vec<[f64; 3]>, listed: Option<CellList>) -> Result<TetMesh, ReadError> {
+    fn mesh(mut self, positions: Vec<[f64; 3]>, listed: Option<CellList<'_>>) -> Result<TetMesh, ReadError> {
         self.memory.take(24 * positions.len() as u64).at(|| "POINTS".into())?;
         let used = || listed.as_ref().map(|listed| listed.used(positions.len()));
         check_finite(&positions, &self.fields.fields, &used).at(|| "POINT_DATA".into())?;
@@ -645,7 +645,7 @@ impl<'a> Body<'a> {
         let length = cells::checked_ends(&self.types, &ends).at(|| "CELLS".into())?;
         expect_count("numbers in the cell list", length, self.connectivity.len()).at(|| "CELLS".into())?;
         let (types, connectivity) = (std::mem::take(&mut self.types), std::mem::take(&mut self.connectivity));
-        let mut listed = CellList { types, ends, connectivity };
+        let mut listed = CellList { types, ends, connectivity: Indices::Listed(connectivity) };
         listed.order_as_before_9(swapped);
         let [of_points, of_cells] = std::mem::take(&mut self.ghosts);
         if let Some(flags) = of_cells {

@@ -68,6 +68,7 @@ mod pvd;
 mod pvtu;
 mod raw;
 mod scanner;
+mod shares;
 mod structured;
 mod surface;
 mod survey;

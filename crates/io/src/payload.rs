@@ -11,7 +11,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use base64::{Engine, alphabet};
 
 use crate::error::{ReadReason, expect_count};
-use crate::xz;
+use crate::{shares, xz};
 
 /// How the blocks of a file are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,12 +60,11 @@ impl<'a> Source<'a> {
                     if group.is_empty() {
                         return Err(truncated(count, rest.len()));
                     }
-                    let decoded =
-                        BASE64.decode(&group).map_err(|e| ReadReason::Damaged(format!("base64: {e}")))?;
-                    if decoded.is_empty() {
+                    let before = rest.len();
+                    decode_groups(&group, rest)?;
+                    if rest.len() == before {
                         return Err(ReadReason::Damaged("base64: an empty group".into()));
                     }
-                    rest.extend_from_slice(&decoded);
                 }
                 let later = rest.split_off(count);
                 Ok(Cow::Owned(std::mem::replace(rest, later)))
@@ -81,12 +80,35 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
+/// Groups of four characters that a thread decodes at a time.
+const GROUPS: usize = 1 << 15;
+
+/// Appends to `bytes` what groups of four characters stand for.
+fn decode_groups(groups: &[u8], bytes: &mut Vec<u8>) -> Result<(), ReadReason> {
+    let damaged = |error| ReadReason::Damaged(format!("base64: {error}"));
+    if groups.len() <= 4 * GROUPS {
+        return BASE64.decode_vec(groups, bytes).map_err(damaged);
+    }
+    bytes.reserve(groups.len() / 4 * 3);
+    shares::append(bytes, groups.len() / 4, GROUPS, |share| {
+        BASE64.decode(&groups[4 * share.start..4 * share.end]).map_err(damaged)
+    })
+}
+
+/// The place of the first byte of a kind. Chunks without any are passed over as a whole, which compilers make vector instructions of.
+pub(super) fn find(bytes: &[u8], is_it: impl Fn(u8) -> bool) -> Option<usize> {
+    let (chunks, _) = bytes.as_chunks::<64>();
+    let without = |chunk: &&[u8; 64]| !chunk.iter().fold(false, |found, byte| found | is_it(*byte));
+    let start = 64 * chunks.iter().take_while(without).count();
+    bytes[start..].iter().position(|byte| is_it(*byte)).map(|at| start + at)
+}
+
 /// Cuts whole groups of four characters off `text`: as many as `bytes` bytes need, or up to padding.
 fn next_groups<'a>(text: &mut &'a [u8], bytes: usize) -> Cow<'a, [u8]> {
     *text = text.trim_ascii_start();
     let wanted = bytes.div_ceil(3).saturating_mul(4).min(text.len());
     let run = &text[..wanted];
-    let end = run.iter().position(|c| *c == b'=' || c.is_ascii_whitespace()).unwrap_or(wanted);
+    let end = find(run, |c| c <= b' ' || c == b'=').unwrap_or(wanted);
     let whole = end - end % 4;
     if whole > 0 {
         let (groups, after) = text.split_at(whole);
@@ -132,21 +154,27 @@ pub(super) fn read_block<'a>(
     for _ in 0..blocks {
         sizes.push(header_number(&mut source, framing)?);
     }
+    let packed = sizes.iter().map(|&size| source.take(to_usize(size)?)).collect::<Result<Vec<_>, _>>()?;
     let mut data = Vec::new();
-    for (i, size) in (0_u64..).zip(sizes) {
-        let compressed = source.take(to_usize(size)?)?;
-        let expected = to_usize(if i + partial < blocks { block_size } else { last_size })?;
-        let before = data.len();
-        decompress(compressor, &compressed, expected, &mut data)?;
-        if data.len() - before != expected {
-            let found = data.len() - before;
-            return Err(ReadReason::Damaged(format!(
-                "block {i} unpacks to {found} bytes instead of {expected}"
-            )));
+    shares::append(&mut data, packed.len(), BLOCKS, |share| {
+        let mut part = Vec::new();
+        for i in share {
+            let expected = to_usize(if i as u64 + partial < blocks { block_size } else { last_size })?;
+            let before = part.len();
+            decompress(compressor, &packed[i], expected, &mut part)?;
+            let found = part.len() - before;
+            if found != expected {
+                let what = format!("block {i} unpacks to {found} bytes instead of {expected}");
+                return Err(ReadReason::Damaged(what));
+            }
         }
-    }
+        Ok(part)
+    })?;
     Ok(Cow::Owned(data))
 }
+
+/// Compressed blocks that a thread unpacks at a time. VTK's have 32 KiB each.
+const BLOCKS: usize = 4;
 
 fn to_usize(n: u64) -> Result<usize, ReadReason> {
     usize::try_from(n).map_err(|_| ReadReason::Truncated { needed: n, found: 0 })
@@ -167,7 +195,7 @@ fn decompress(
 ) -> Result<(), ReadReason> {
     match compressor {
         Compressor::Zlib => {
-            let mut decoder = flate2::read::ZlibDecoder::new(compressed).take(expected as u64 + 1);
+            let mut decoder = flate2::bufread::ZlibDecoder::new(compressed).take(expected as u64 + 1);
             decoder.read_to_end(data).map_err(|e| ReadReason::Damaged(format!("zlib: {e}")))?;
         }
         Compressor::Lz4 => {
@@ -184,4 +212,36 @@ fn decompress(
         Compressor::Lzma => xz::decompress(compressed, expected, data)?,
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BASE64, Source, find};
+    use base64::Engine;
+
+    #[test]
+    fn long_base64_is_decoded_like_short_one() {
+        let bytes: Vec<u8> = (0..500_000_u32).map(|x| (x.wrapping_mul(x) >> 7) as u8).collect();
+        let text = BASE64.encode(&bytes);
+        let lines: Vec<u8> = text.as_bytes().chunks(76).collect::<Vec<_>>().join(&b"\r\n"[..]);
+        for text in [text.as_bytes(), &lines] {
+            let mut source = Source::base64(text);
+            assert_eq!(source.take(7).as_deref(), Ok(&bytes[..7]));
+            assert_eq!(source.take(499_990).as_deref(), Ok(&bytes[7..499_997]));
+            assert!(source.take(4).is_err());
+            let mut damaged = text.to_vec();
+            damaged[400_000] = b'!';
+            assert!(Source::base64(&damaged).take(500_000).is_err());
+        }
+    }
+
+    #[test]
+    fn the_first_byte_of_a_kind_is_found_wherever_it_is() {
+        let mut bytes = [b'a'; 200];
+        assert_eq!(find(&bytes, |byte| byte == b'='), None);
+        for at in (0..200).rev() {
+            bytes[at] = b'=';
+            assert_eq!(find(&bytes, |byte| byte == b'='), Some(at));
+        }
+    }
 }

@@ -169,7 +169,7 @@ impl PieceReader<'_, '_> {
     }
 
     /// The cells; none if the piece has points alone.
-    fn cells(&self, cells: usize) -> Result<Option<CellList>, ReadError> {
+    fn cells(&self, cells: usize) -> Result<Option<CellList<'_>>, ReadError> {
         if cells == 0 {
             return Ok(Some(CellList::default()));
         }
@@ -196,7 +196,7 @@ impl PieceReader<'_, '_> {
         let length = cells::checked_ends(&kinds, &ends).at(|| offsets.place())?;
         let connectivity = find("connectivity")?;
         self.expect_numbers(length).at(|| connectivity.place())?;
-        let list = self.document.integers(connectivity, length).at(|| connectivity.place())?;
+        let list = self.document.indices(connectivity, length).at(|| connectivity.place())?;
         let mut list = CellList { types: kinds, ends, connectivity: list };
         if let Some(swapped) = swapped {
             list.order_as_before_9(swapped);

@@ -1,14 +1,17 @@
 //! The frame of VTK XML files: pieces, arrays, appended data. What the arrays mean is up to `vtu` and `vti`.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
+use crate::cells::Indices;
 use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::number::NumberType;
 use crate::payload;
 use crate::payload::{Compressor, Framing, Source};
+use crate::shares;
 
 /// What the types of documents begin with that list files with pieces.
 pub(super) const IN_FILES: char = 'P';
@@ -236,12 +239,23 @@ impl<'a> Document<'a> {
         self.values(array, count, 1, NumberType::parse_integer, NumberType::integers)
     }
 
-    fn values<T>(
+    /// The same, decoded later if they are numbers already.
+    pub fn indices<'b>(&'b self, array: &'b Array<'a>, count: usize) -> Result<Indices<'b>, ReadReason> {
+        let number = array.number_type().filter(|number| number.is_integer());
+        let (Some(number), true) = (number, count > 0 && array.encoding() != Encoding::Ascii) else {
+            return self.integers(array, count).map(Indices::Listed);
+        };
+        let bytes = count.checked_mul(number.size()).ok_or_else(|| endless(array))?;
+        let bytes = payload::read_block(self.source(array)?, self.framing, bytes)?;
+        Ok(Indices::Stored { bytes, number, big: self.framing.big })
+    }
+
+    fn values<T: Copy + Send>(
         &self,
         array: &Array<'a>,
         tuples: usize,
         components: usize,
-        parse: impl Fn(NumberType, &str) -> Result<T, ReadReason>,
+        parse: impl Fn(NumberType, &str) -> Result<T, ReadReason> + Sync + Send,
         decode: impl Fn(NumberType, &[u8], bool) -> Result<Vec<T>, ReadReason>,
     ) -> Result<Vec<T>, ReadReason> {
         let number = array.number_type().ok_or_else(|| {
@@ -250,9 +264,7 @@ impl<'a> Document<'a> {
         })?;
         let needed = tuples.checked_mul(components);
         let bytes = needed.and_then(|n| n.checked_mul(number.size()));
-        let (Some(needed), Some(bytes)) = (needed, bytes) else {
-            return Err(ReadReason::Truncated { needed: u64::MAX, found: array.text.len() as u64 });
-        };
+        let (Some(needed), Some(bytes)) = (needed, bytes) else { return Err(endless(array)) };
         if array.encoding() == Encoding::Ascii {
             return parse_text(&array.text, needed, |token| parse(number, token));
         }
@@ -280,6 +292,11 @@ impl<'a> Document<'a> {
     }
 }
 
+/// The error of an array that has more bytes than can be counted.
+fn endless(array: &Array<'_>) -> ReadReason {
+    ReadReason::Truncated { needed: u64::MAX, found: array.text.len() as u64 }
+}
+
 /// Where the values of an array are.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Encoding {
@@ -291,22 +308,49 @@ enum Encoding {
     Appended,
 }
 
+/// Bytes of text that a thread parses at a time.
+const SHARE: usize = 1 << 17;
+
 /// Exactly `needed` numbers of white-space separated text.
-fn parse_text<T>(
+fn parse_text<T: Copy + Send>(
     text: &str,
     needed: usize,
-    parse: impl Fn(&str) -> Result<T, ReadReason>,
+    parse: impl Fn(&str) -> Result<T, ReadReason> + Sync + Send,
 ) -> Result<Vec<T>, ReadReason> {
-    let values: Vec<T> = text.split_ascii_whitespace().map(parse).collect::<Result<_, _>>()?;
+    // No more than there can be: each has a character, and white space behind it.
+    let mut values = Vec::with_capacity(needed.min(text.len() / 2 + 1));
+    shares::append(&mut values, text.len(), SHARE, |share| {
+        words_from(text, share).split_ascii_whitespace().map(&parse).collect()
+    })?;
     expect_count("numbers", needed, values.len())?;
     Ok(values)
+}
+
+/// The words that begin in a part of the text, and the white space around them.
+fn words_from(text: &str, part: Range<usize>) -> &str {
+    let bytes = text.as_bytes();
+    let space = |range: Range<usize>| {
+        bytes[range.clone()].iter().position(u8::is_ascii_whitespace).map(|at| range.start + at)
+    };
+    // The word that the part begins with is that of an earlier one, if it goes on from there.
+    let start = if part.start == 0 { Some(0) } else { space(part.start - 1..part.end) };
+    let end = |_| space(part.end - 1..bytes.len()).unwrap_or(bytes.len());
+    // White space is a character by itself: both are between characters.
+    start.map_or("", |start| text.get(start..end(start)).unwrap_or_default())
 }
 
 /// Splits a file with appended data, which is not XML, into the text up to and including the start tag of
 /// `<AppendedData>` and the bytes after the underscore that marks the data's beginning.
 fn split_appended(bytes: &[u8]) -> Result<(&[u8], &[u8]), ReadReason> {
     const TAG: &[u8] = b"<AppendedData";
-    let Some(start) = bytes.windows(TAG.len()).position(|w| w == TAG) else { return Ok((bytes, &[])) };
+    let mut start = 0;
+    while !bytes[start..].starts_with(TAG) {
+        let Some(next) = bytes.get(start + 1..).and_then(|rest| payload::find(rest, |byte| byte == b'<'))
+        else {
+            return Ok((bytes, &[]));
+        };
+        start += 1 + next;
+    }
     let end = bytes[start..].iter().position(|c| *c == b'>').map(|i| start + i + 1);
     let end = end.ok_or_else(|| ReadReason::Syntax("the tag does not end".into()))?;
     let (text, rest) = bytes.split_at(end);
@@ -494,4 +538,25 @@ fn framing(file: &Attributes) -> Result<Framing, ReadReason> {
         Some(other) => return unknown("compressor", other),
     };
     Ok(Framing { big, wide, compressor })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::words_from;
+
+    #[test]
+    fn each_word_is_in_one_part_whatever_the_parts_are() {
+        for text in ["", " ", "12 3.5\n777\t8é 9", "  a long-word-of-its-own  b c ", "one"] {
+            let all: Vec<&str> = text.split_ascii_whitespace().collect();
+            for share in 1..=text.len() {
+                let starts = (0..text.len()).step_by(share);
+                let parts = starts.map(|start| words_from(text, start..text.len().min(start + share)));
+                assert_eq!(
+                    parts.flat_map(str::split_ascii_whitespace).collect::<Vec<_>>(),
+                    all,
+                    "{text:?}, {share}"
+                );
+            }
+        }
+    }
 }

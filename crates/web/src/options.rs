@@ -5,7 +5,9 @@ use js_sys::Function;
 use std::sync::Arc;
 use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
-use tetralod::refine::{Budget, Criterion, Need, Part, Region, Request, RequestError, Transfer, View};
+use tetralod::refine::{
+    Budget, Criterion, Inside, Need, Part, Region, Request, RequestError, Transfer, View,
+};
 use tetralod_web_options::error::WebError;
 use tetralod_web_options::given::Given;
 use tetralod_web_options::read_error::ReadError;
@@ -23,7 +25,7 @@ extern "C" {
 }
 
 /// The options of a need and behind them those of a whole request, as refusals list them.
-const NAMES: [&str; 17] = [
+const NAMES: [&str; 18] = [
     "error",
     "field",
     "box",
@@ -38,6 +40,7 @@ const NAMES: [&str; 17] = [
     "transfer",
     "needs",
     "where",
+    "whereBox",
     "maxTets",
     "maxVertices",
     "maxBytes",
@@ -97,8 +100,10 @@ fn parse(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Asked, 
     for need in &needs {
         parser.need(need)?;
     }
-    if let Some(function) = all.member("where") {
-        parser.function(function, &all)?;
+    match all.member("where") {
+        Some(function) => parser.function(function, &all)?,
+        None if all.has("whereBox") => return Err(all.refuse("whereBox", "has no place without `where`")),
+        None => {}
     }
     // Casts saturate: more than an integer can count, infinity included, is no limit.
     parser.asked.request.budget = Budget {
@@ -139,6 +144,12 @@ fn corners(numbers: &[f64]) -> Result<Bounds, &'static str> {
     Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
 }
 
+/// The box that the option `name` is.
+fn bounds(given: &Given, name: &str) -> Result<Option<Bounds>, ReadError> {
+    let corners = |numbers: Vec<f64>| corners(&numbers).map_err(|problem| given.refuse(name, problem));
+    given.numbers(name)?.map(corners).transpose()
+}
+
 /// The option `kind` makes the need one of its own kind: of the others it has but these.
 fn stands_alone(need: &Given, kind: &str, besides: &[&str]) -> Result<(), ReadError> {
     match LIMITS.iter().find(|name| **name != kind && !besides.contains(name) && need.has(name)) {
@@ -155,9 +166,8 @@ fn stands_alone(need: &Given, kind: &str, besides: &[&str]) -> Result<(), ReadEr
 /// The regions that are given, by their names.
 fn regions(need: &Given) -> Result<Vec<(&'static str, Region)>, ReadError> {
     let mut regions = Vec::new();
-    if let Some(numbers) = need.numbers("box")? {
-        let corners = corners(&numbers).map_err(|problem| need.refuse("box", problem))?;
-        regions.push(("box", Region::Box(corners)));
+    if let Some(bounds) = bounds(need, "box")? {
+        regions.push(("box", Region::Box(bounds)));
     }
     if let Some(at) = need.inside("sphere", &["center", "radius"])? {
         let (centre, radius) = (at.fixed("center")?, at.needed_number("radius")?);
@@ -295,7 +305,11 @@ impl Parser<'_> {
     fn function(&mut self, function: JsValue, all: &Given) -> Result<(), ReadError> {
         let problem = "must be a function, or the URL of a module that has one";
         let function = function.dyn_into::<Function>().map_err(|_| all.refuse("where", problem))?;
-        self.asked.custom.push(Arc::new(Callback::new(function, self.info, self.asked.field)));
+        let callback = Callback::new(function, self.info, self.asked.field);
+        self.asked.custom.push(match bounds(all, "whereBox")? {
+            Some(bounds) => Arc::new(Inside::new(callback, bounds, self.info.lattice)),
+            None => Arc::new(callback),
+        });
         Ok(())
     }
 }

@@ -64,6 +64,7 @@ const requests: Examples<RefineOptions> = {
   ...needs,
   needs: { needs: Object.values(needs) },
   where: { where: ({ errors }) => errors.map((error) => error / 0.1) },
+  whereBox: { where: ({ errors }) => errors.map((error) => error / 0.1), whereBox: [0, 0, 0, 0.5, 0.5, 0.5] },
   maxTets: { error: 0, maxTets: 1000 },
   maxVertices: { error: 0, maxVertices: 500 },
   maxBytes: { error: 0, maxBytes: 100_000 },

@@ -13,7 +13,7 @@ use tetralod::mesh::{Field, MeshInput, TetMesh};
 pub(super) struct Draft<'a> {
     pub options: &'a ReadOptions,
     pub coordinates: Vec<f64>,
-    list: CellList,
+    list: CellList<'static>,
     pub fields: Collector<'a>,
     pub cell_fields: Collector<'a>,
     /// How many cells without a volume there are of each of VTK's types; they are left out.
@@ -44,8 +44,9 @@ impl<'a> Draft<'a> {
 
     /// Which of so many points a cell uses; all if there are no cells.
     pub fn used(&self, points: usize) -> Vec<bool> {
-        let mut used = vec![self.list.connectivity.is_empty(); points];
-        for &point in &self.list.connectivity {
+        let listed = self.list.connectivity.part(0..usize::MAX);
+        let mut used = vec![listed.is_empty(); points];
+        for &point in listed.iter() {
             if let Some(used) = usize::try_from(point).ok().and_then(|point| used.get_mut(point)) {
                 *used = true;
             }
@@ -56,8 +57,9 @@ impl<'a> Draft<'a> {
     /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has.
     pub fn add_cell(&mut self, kind: i64, points: impl IntoIterator<Item = i64>) {
         self.list.types.push(kind);
-        self.list.connectivity.extend(points);
-        self.list.ends.push(self.list.connectivity.len() as i64);
+        let listed = self.list.connectivity.to_mut();
+        listed.extend(points);
+        self.list.ends.push(listed.len() as i64);
     }
 
     /// Keeps an array with values at points, which are read only if they are wanted.

@@ -9,7 +9,7 @@ use std::ops::Range;
 use hdf5_reader::{Dataset, Hdf5File};
 
 use crate::cell_types;
-use crate::cells::{self, CellList, Numbering};
+use crate::cells::{self, CellList, Indices, Numbering};
 use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::formats::hdf5_values::{
@@ -265,7 +265,7 @@ impl Reader<'_> {
     }
 
     /// The cells of a piece; none if it has points alone.
-    fn cells(&self, piece: &Piece) -> Result<Option<CellList>, ReadReason> {
+    fn cells(&self, piece: &Piece) -> Result<Option<CellList<'static>>, ReadReason> {
         if piece.cells.is_empty() {
             return Ok(Some(CellList::default()));
         }
@@ -283,12 +283,12 @@ impl Reader<'_> {
         cells::most_tets(&types)?;
         let found = cells::checked_ends(&types, &ends)?;
         expect_count("points of cells", piece.ids.end - piece.ids.start, found)?;
-        let connectivity = integers(&self.dataset("Connectivity")?, piece.ids.clone())?;
+        let connectivity = Indices::Listed(integers(&self.dataset("Connectivity")?, piece.ids.clone())?);
         Ok(Some(CellList { types, ends, connectivity }))
     }
 
     /// Leaves out the cells that VTK's flags mark as another piece's or as hidden.
-    fn leave_out_ghosts(&self, listed: &mut CellList, piece: &Piece) -> Result<(), ReadReason> {
+    fn leave_out_ghosts(&self, listed: &mut CellList<'_>, piece: &Piece) -> Result<(), ReadReason> {
         if let Some(ghosts) = self.dataset_if(&format!("CellData/{GHOST_TYPE}"))? {
             listed.leave_out(&integers(&ghosts, self.rows_of("CellData", GHOST_TYPE, piece)?)?);
         }
