@@ -40,11 +40,14 @@ function on(): Stage {
 
 const invalidate = () => on().frames.invalidate();
 
+/** What draws. */
+const device = () => ({ adapter: on().viewer.adapter(), isSoftware: on().viewer.isSoftware });
+
 /** Another volume takes the place of the one before, of which this is drawn. */
 function forget(wanted: Wanted) {
   const { shown, mesh, frames } = on();
   shown.forget(wanted);
-  mesh.forget();
+  mesh.forget(wanted.request);
   frames.forget();
   frames.invalidate();
 }
@@ -102,7 +105,7 @@ const methods = {
     const pace = new Pace(viewer, mesh, frameTime, invalidate);
     stage = { viewer, mesh, pace, shown: new Shown(viewer), frames: new Frames(viewer, mesh, pace, emit) };
     invalidate();
-    return { adapter: viewer.adapter() };
+    return device();
   },
 
   /** Opens the GPU again after it was lost, for another canvas, and draws everything anew. */
@@ -111,12 +114,12 @@ const methods = {
     frames.restart(await Gpu.open(canvas, width, height));
     viewer.resize(width, height, ratio);
     invalidate();
-    return { adapter: viewer.adapter() };
+    return device();
   },
 
-  clear(fields: readonly string[], state: ViewerChanges) {
+  async clear(fields: readonly string[], state: ViewerChanges, request?: Unchecked) {
     const { viewer, shown } = on();
-    const wanted = shown.first(state);
+    const wanted = { ...shown.first(state), request: request && (await received(request)) };
     methods.halt();
     viewer.clear([...fields]);
     forget(wanted);
@@ -145,10 +148,10 @@ const methods = {
   /** Opens a file in parts; resolves to nothing where the server gives no ranges, and otherwise when it has been drawn. */
   async openParts(
     url: string,
-    { fields, memory, state, ...options }: RangesOptions & { fields: readonly string[]; memory: number; state: ViewerChanges },
+    { fields, memory, state, request, ...options }: RangesOptions & { fields: readonly string[]; memory: number; state: ViewerChanges; request?: Unchecked | undefined },
   ): Promise<Opened | undefined> {
     const { viewer, shown, mesh, frames } = on();
-    const wanted = shown.first(state);
+    const wanted = { ...shown.first(state), request: request && (await received(request)) };
     methods.halt();
     const onError = (error: TetralodError) => {
       if (mesh.ready && !viewer.isOpening) emit("error", flattenError(error));
@@ -162,6 +165,8 @@ const methods = {
       return undefined;
     }
     mesh.ready = true;
+    // What a request needs is fetched while the first picture is drawn.
+    if (request) mesh.follow();
     invalidate();
     await frames.drawn();
     frames.reportCamera();

@@ -18,10 +18,18 @@ let server;
 /** Paths that were asked for. */
 let asked = [];
 
+/** Answers with a part of the file. */
+function endPart(range, response) {
+  const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(range).map(Number);
+  const part = file.subarray(first, last + 1);
+  response.writeHead(206, { etag: '"1"', "content-range": `bytes ${first}-${first + part.length - 1}/${file.length}` }).end(part);
+}
+
 before(async () => {
-  server = await servePackage(({ url }, response) => {
+  server = await servePackage(({ url, headers }, response) => {
     asked.push(url);
     if (url === "/model.mt") response.end(file);
+    else if (url === "/parts.mt") endPart(headers.range, response);
     else if (url === "/fields.mt") response.end(fields);
     else if (url === "/nothing.mt") response.writeHead(404).end();
     else response.setHeader("content-type", "text/html").end(PAGE);
@@ -214,6 +222,40 @@ test("after `open` alone the mesh becomes the one that the picture needs", async
   await page.close();
 });
 
+test("a request that comes with `open` is the first one, and a later one replaces it", async () => {
+  const page = await opened();
+  await page.evaluate(CODES);
+  const seen = await page.evaluate(async () => {
+    const {
+      codeOf,
+      tetralodDemo: { viewer },
+    } = /** @type {any} */ (window);
+    const settled = async () => {
+      await viewer.settled();
+      return (await viewer.mesh()).tets.length / 4;
+    };
+    const counts = [];
+    for (const file of ["/model.mt", "/parts.mt"]) {
+      const { finished } = await viewer.open(file, { request: { error: "10%" } });
+      await finished;
+      const first = await settled();
+      await viewer.refine({ error: "10%" });
+      const asked = await settled();
+      await viewer.open(file, { request: { error: "10%" } });
+      await viewer.refine({ error: 0 });
+      counts.push({ first, asked, later: await settled() });
+    }
+    return { counts, wrong: await codeOf(viewer.open("/model.mt", { request: { where: () => true } })) };
+  });
+  const full = await page.evaluate(() => window.tetralodDemo.full.tetrahedra);
+  for (const { first, asked, later } of seen.counts) {
+    assert.ok(first < full / 2, JSON.stringify(seen));
+    assert.deepEqual([first, later], [asked, full]);
+  }
+  assert.equal(seen.wrong, "bad-option");
+  await page.close();
+});
+
 test("at rest the picture shows what was set", async () => {
   const page = await opened();
   const drawn = await page.evaluate(async () => {
@@ -388,6 +430,28 @@ test("where pictures take too long the mesh is coarser while something moves, an
   assert.ok(seen.moving < seen.full / 2, JSON.stringify(seen));
   assert.equal(seen.early, 0, "a mesh for movement is not the one that was asked for");
   assert.ok(seen.same, "at rest it is what was asked for");
+  await page.close();
+});
+
+test("a viewer says whether it draws in software, and pictures have fewer pixels only while something moves", async () => {
+  const page = await opened({ frameTime: 1 });
+  const seen = await page.evaluate(async () => {
+    const { viewer, events } = window.tetralodDemo;
+    const scales = () => events.filter(({ name }) => name === "frame").map(({ detail }) => detail.scale);
+    await viewer.settled();
+    events.length = 0;
+    for (let i = 0; i < 300 && !scales().some((scale) => scale < 1); i++) {
+      await viewer.orbit(0.05, 0);
+      await new Promise(requestAnimationFrame);
+    }
+    const least = Math.min(...scales());
+    await viewer.settled();
+    const { info } = await navigator.gpu.requestAdapter();
+    return { least, last: scales().at(-1), said: viewer.isSoftware, is: info.isFallbackAdapter };
+  });
+  assert.ok(seen.least < 1, JSON.stringify(seen));
+  assert.equal(seen.last, 1);
+  assert.equal(seen.said, seen.is);
   await page.close();
 });
 
