@@ -1,9 +1,10 @@
 //! How much of a file the first useful picture needs.
 
 use super::Result;
-use super::mt_file::{mt_file, percent_of};
+use super::mt_file::mt_file;
 use super::sets::Set;
 use super::surfaces::{Interpolant, Mesh, Surface};
+use super::table::percent_of;
 use std::io::Cursor;
 use tetralod::format::DecodeOptions;
 use tetralod::geom::Bounds;

@@ -14,8 +14,3 @@ pub fn mt_file(mesh: &TetMesh, kind: MtKind, purpose: Purpose) -> Result<Vec<u8>
     let mt = build(mesh, &config)?.mt;
     Ok(encode(&mt, &EncodeOptions::default())?)
 }
-
-/// A part of a file, in percent.
-pub fn percent_of(part: u64, file: &[u8]) -> f64 {
-    100.0 * part as f64 / file.len() as f64
-}

@@ -1,9 +1,10 @@
 //! What requests cost over a network.
 
 use super::Result;
-use super::mt_file::{mt_file, percent_of};
+use super::mt_file::mt_file;
 use super::network::{Cost, Network, Protocol, Visitor};
 use super::sets;
+use super::table::percent_of;
 use std::fs;
 use std::path::Path;
 use tetralod::geom::Bounds;

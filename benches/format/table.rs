@@ -179,3 +179,8 @@ fn decode(bytes: &[u8]) -> Result<(Decoder, f64)> {
     }
     Ok((last.ok_or("never decoded")?, best))
 }
+
+/// A part of a file, in percent.
+pub fn percent_of(part: u64, file: &[u8]) -> f64 {
+    100.0 * part as f64 / file.len() as f64
+}
