@@ -55,15 +55,13 @@ var<private> opaque: f32;
 // The part of the ray that is not cut away.
 var<private> limits: vec2f;
 
-fn at(value: f32) -> vec4f {
-    let last = settings.table.z - 1.0;
-    let place = clamp((value - settings.table.x) / settings.table.y, 0.0, last);
-    let below = min(u32(place), u32(last) - 1u);
-    return mix(medium[below], medium[below + 1u], place - f32(below));
+// Of a value: emission and extinction, and their integrals up to it.
+struct Entry {
+    here: vec4f,
+    integral: vec4f,
 }
 
-// The integrals up to a value.
-fn integral(value: f32) -> vec4f {
+fn entry_of(value: f32) -> Entry {
     let count = u32(settings.table.z);
     let last = settings.table.z - 1.0;
     let place = (value - settings.table.x) / settings.table.y;
@@ -72,9 +70,10 @@ fn integral(value: f32) -> vec4f {
     let t = held - f32(below);
     let low = emitted(medium[below]);
     let step = emitted(medium[below + 1u]) - low;
+    let here = low + t * step;
     let inside = medium[count + below] + settings.table.y * t * (low + 0.5 * t * step);
     // Beyond the ends the medium is constant.
-    return inside + settings.table.y * (place - held) * emitted(at(value));
+    return Entry(here, inside + settings.table.y * (place - held) * here);
 }
 
 fn emitted(entry: vec4f) -> vec4f {
@@ -83,11 +82,13 @@ fn emitted(entry: vec4f) -> vec4f {
 
 // The mean of emission and extinction between two values.
 fn mean(low: f32, high: f32) -> vec4f {
+    let first = entry_of(low);
+    let second = entry_of(high);
     // Integrals of nearly the same values differ by less than they are rounded.
     if abs(high - low) < settings.table.y {
-        return 0.5 * (emitted(at(low)) + emitted(at(high)));
+        return 0.5 * (first.here + second.here);
     }
-    return (integral(high) - integral(low)) / (high - low);
+    return (second.integral - first.integral) / (high - low);
 }
 
 // Lays a premultiplied colour behind what has been seen.
@@ -96,22 +97,26 @@ fn behind(premultiplied: vec3f, through: f32) {
     transmittance *= through;
 }
 
-// A piece of the ray in the volume, between two values.
+// What so much of the ray shows, with this mean of emission and extinction.
+fn take_part(part: vec4f, length: f32) {
+    let through = exp(-part.a * length);
+    if part.a > 0.0 {
+        behind(part.rgb / part.a * (1.0 - through), through);
+    }
+}
+
+// A piece of the ray in the volume, between two values. Most are short: one part, whose mean is that of the whole.
 fn piece(low: f32, high: f32, length: f32) {
-    let whole = mean(low, high).a * length;
-    if whole <= 0.0 {
+    let whole = mean(low, high);
+    let pieces = min(ceil(whole.a * length / PIECE_DEPTH), MOST_PIECES);
+    if pieces <= 1.0 {
+        take_part(whole, length);
         return;
     }
-    let pieces = clamp(ceil(whole / PIECE_DEPTH), 1.0, MOST_PIECES);
     var from_value = low;
     for (var i = 1.0; i <= pieces; i += 1.0) {
         let to_value = mix(low, high, i / pieces);
-        let part = mean(from_value, to_value);
-        let depth = part.a * length / pieces;
-        let through = exp(-depth);
-        if part.a > 0.0 {
-            behind(part.rgb / part.a * (1.0 - through), through);
-        }
+        take_part(mean(from_value, to_value), length / pieces);
         from_value = to_value;
     }
 }
