@@ -118,7 +118,7 @@ export class Frames {
   #tell(milliseconds: number) {
     const { bytes, ready } = this.#mesh;
     const uploaded = this.#viewer.takeUploaded();
-    this.#emit("frame", { milliseconds, triangles: this.#viewer.triangles, uploaded, gpuBytes: this.#viewer.gpuBytes, bytes, ready });
+    this.#emit("frame", { milliseconds, triangles: this.#viewer.triangles, uploaded, gpuBytes: this.#viewer.gpuBytes, scale: this.#pace.scale, bytes, ready });
     this.reportCamera();
     this.#report("legend", this.#viewer.legend());
     this.#report("overlay", this.#viewer.overlay());

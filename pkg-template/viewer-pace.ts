@@ -1,12 +1,16 @@
-/** How finely a viewer draws while something moves: with as many pixels, and then tetrahedra, as there is time for. */
+/** How finely a viewer draws while something moves: as well as it can, or quickly, then with as many pixels and tetrahedra as there is time for. */
 
 import type { Viewer } from "./tetralod_viewer.js";
 import type { MeshWork } from "./viewer-mesh.js";
 
-/** Pictures have these parts of the pixels, in each direction, while something moves. */
+/** Quick pictures have these parts of the pixels, in each direction. */
 const SCALES = [1, 0.7, 0.5, 0.35, 0.25];
 const LEAST = 0.25;
-/** After so long without movement, the picture is made sharp again (in ms). */
+/** More pixels are drawn again where there is time for so many times as many: else the picture would become sharp and blurred in turns. */
+const MARGIN = 1.25;
+/** So many times faster than others a quick picture is taken to be before there was one. */
+const GAIN = 4;
+/** After so long without movement, the last picture of which is finished, the picture is made sharp again (in ms). */
 const REST = 250;
 /** Where fewer pixels do not help, a mesh of fewer tetrahedra is drawn while something moves, but of no fewer than these. */
 const FEWEST_TETS = 10_000;
@@ -20,14 +24,17 @@ export class Pace {
   #changed: () => void;
   /** How long a picture should take while something moves (in ms). */
   frameTime: number;
-  /** When the last picture was begun, while the GPU has not finished it; and how long it took to finish the one before. */
-  #begun: number | undefined;
+  /** When the last picture was begun, and how it is drawn, while the GPU has not finished it; and how long it took to finish the one before. */
+  #begun: { start: number; isQuick: boolean; scale: number } | undefined;
   #took = 0;
-  /** Whether the GPU has finished a picture: the first one waits for pipelines to be compiled, so its time says nothing. */
-  #isWarm = false;
-  /** The part of the pixels, in each direction, with which a picture takes about as long as it should; and the one that is set. */
+  /** Of which kind, quick or not, the GPU has finished a picture: the first ones wait for pipelines to be compiled, so their times say nothing. */
+  #warm = new Set<boolean>();
+  /** How long the last picture took that was not quick, and how many times as long as a quick one with as many pixels. */
+  #full = 0;
+  #gain = GAIN;
+  /** What is set: whether pictures are quick, and their part of the pixels, in each direction. */
+  #isQuick = false;
   #scale = 1;
-  #current = 1;
   /** Sharpens the picture when nothing changes any more. */
   #resting: ReturnType<typeof setTimeout> | undefined;
   /** How many tetrahedra a picture can have while something moves. */
@@ -35,6 +42,11 @@ export class Pace {
 
   constructor(viewer: Viewer, mesh: MeshWork, frameTime: number, changed: () => void) {
     [this.#viewer, this.#mesh, this.frameTime, this.#changed] = [viewer, mesh, frameTime, changed];
+  }
+
+  /** The part of the pixels that pictures have, in each direction. */
+  get scale(): number {
+    return this.#scale;
   }
 
   /** Whether something has moved just now. */
@@ -54,55 +66,69 @@ export class Pace {
 
   /** Another GPU begins anew. */
   restart() {
-    [this.#begun, this.#current, this.#isWarm] = [undefined, 1, false];
+    [this.#begun, this.#isQuick, this.#scale] = [undefined, false, 1];
+    this.#warm.clear();
   }
 
   /** The canvas has another size, at which it is drawn with all pixels. */
   resized() {
-    this.#current = 1;
+    this.#scale = 1;
   }
 
   /** A picture was begun then. */
   began(start: number) {
-    this.#begun = start;
+    this.#begun = { start, isQuick: this.#isQuick, scale: this.#scale };
   }
 
   /** The same of one more picture at rest, whose time counts where that of another one is not known. */
   improved(start: number) {
-    if (this.#took === 0) this.#begun = start;
+    if (this.#took === 0) this.began(start);
   }
 
-  /** Looks whether the GPU has finished the last picture, and chooses the scale of the next ones by its time. */
+  /** Looks whether the GPU has finished the last picture, and how long that took. */
   observe() {
     if (this.#begun === undefined || this.#viewer.inFlight > 0) return;
-    const took = (this.#took = this.#isWarm ? performance.now() - this.#begun : 0);
-    [this.#begun, this.#isWarm] = [undefined, true];
-    const wanted = this.#current * Math.sqrt(this.frameTime / took);
-    this.#scale = SCALES.find((one) => one <= wanted) ?? LEAST;
+    const { start, isQuick, scale } = this.#begun;
+    const took = (this.#took = this.#warm.has(isQuick) ? performance.now() - start : 0);
+    this.#begun = undefined;
+    this.#warm.add(isQuick);
+    if (took === 0) return;
+    if (isQuick) this.#gain = (this.#full * scale ** 2) / took;
+    else this.#full = took;
     if (!this.isMoving) return;
     // Where the fewest pixels still take too long, fewer tetrahedra help.
     const { tets, held } = this.#mesh;
-    if (took > 1.5 * this.frameTime && this.#current === LEAST) this.#affordable = Math.max(FEWEST_TETS, (tets * this.frameTime) / took);
+    if (took > 1.5 * this.frameTime && scale === LEAST) this.#affordable = Math.max(FEWEST_TETS, (tets * this.frameTime) / took);
     else if (took < this.frameTime / 2 && held !== undefined) this.#affordable = Math.min(1.5 * this.#affordable, 2 ** 31);
   }
 
   /** Something moves: draws as finely as there is time for, and finely a little later. */
   move() {
-    this.#setScale(this.#scale);
+    this.#draw(this.#full > this.frameTime);
     const { tets, held } = this.#mesh;
     this.#mesh.hold(held !== undefined || tets > this.#affordable ? Math.round(this.#affordable) : undefined);
+    this.#rest();
+  }
+
+  /** Draws finely a little later. */
+  #rest() {
     clearTimeout(this.#resting);
     this.#resting = setTimeout(() => {
+      if (this.#viewer.inFlight > 0) return this.#rest();
       this.#resting = undefined;
-      this.#setScale(1);
+      this.#draw(false);
       this.#mesh.hold(undefined);
       this.#changed();
     }, REST);
   }
 
-  #setScale(wanted: number) {
-    if (wanted === this.#current) return;
-    this.#current = wanted;
-    this.#viewer.setScale(wanted);
+  /** Draws the next pictures like this: quick ones with a part of the pixels that takes about as long as it should. */
+  #draw(isQuick: boolean) {
+    const most = (this.frameTime * this.#gain) / this.#full;
+    const fits = (scale: number) => scale ** 2 * (this.#isQuick && scale > this.#scale ? MARGIN : 1) <= most;
+    const scale = isQuick ? (SCALES.find(fits) ?? LEAST) : 1;
+    if (isQuick !== this.#isQuick) this.#viewer.setQuick(isQuick);
+    if (scale !== this.#scale) this.#viewer.setScale(scale);
+    [this.#isQuick, this.#scale] = [isQuick, scale];
   }
 }

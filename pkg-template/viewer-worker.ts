@@ -40,6 +40,9 @@ function on(): Stage {
 
 const invalidate = () => on().frames.invalidate();
 
+/** What draws. */
+const device = () => ({ adapter: on().viewer.adapter(), isSoftware: on().viewer.isSoftware });
+
 /** Another volume takes the place of the one before, of which this is drawn. */
 function forget(wanted: Wanted) {
   const { shown, mesh, frames } = on();
@@ -102,7 +105,7 @@ const methods = {
     const pace = new Pace(viewer, mesh, frameTime, invalidate);
     stage = { viewer, mesh, pace, shown: new Shown(viewer), frames: new Frames(viewer, mesh, pace, emit) };
     invalidate();
-    return { adapter: viewer.adapter() };
+    return device();
   },
 
   /** Opens the GPU again after it was lost, for another canvas, and draws everything anew. */
@@ -111,7 +114,7 @@ const methods = {
     frames.restart(await Gpu.open(canvas, width, height));
     viewer.resize(width, height, ratio);
     invalidate();
-    return { adapter: viewer.adapter() };
+    return device();
   },
 
   clear(fields: readonly string[], state: ViewerChanges) {

@@ -108,6 +108,8 @@ export interface ViewerFrame {
    * browser and are not counted.
    */
   gpuBytes: number;
+  /** The part of the canvas's pixels that it has, in each direction: less than 1 only while something moves. */
+  scale: number;
   /** Bytes of the file that had been decoded. */
   bytes: number;
   /** Whether it shows a volume yet. */
@@ -144,8 +146,9 @@ export interface OpenedVolume {
 export interface ViewerOptions {
   signal?: AbortSignal;
   /**
-   * How long a picture should take while something moves, in milliseconds; 60 without it. Where pictures take longer, they
-   * have fewer pixels, then fewer tetrahedra; at rest they get sharp again. `Infinity` always draws everything.
+   * How long a picture should take while something moves, in milliseconds; 60 without it. Where pictures take longer, they are drawn
+   * without shade and with rough edges, then with fewer pixels, then with fewer tetrahedra; at rest they get sharp again. `Infinity`
+   * always draws everything.
    */
   frameTime?: number;
   /** A worker that you have made of `tetralod/viewer-worker`; it belongs to the viewer from then on. Default: its own. */
@@ -248,7 +251,7 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   /** What the picture is on where the canvas cannot show another one. */
   #cover: HTMLCanvasElement | undefined;
   #info: MtInfo | undefined;
-  #adapter = "";
+  #device = { adapter: "", isSoftware: false };
   #stream: AbortController | undefined;
   /** For a file in parts: resolves when a mesh is requested. */
   #requested: (() => void) | undefined;
@@ -323,8 +326,7 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   async #start(frameTime: number) {
     const offscreen = this.#handOver();
     const [width, height] = (this.#size = pixels(this.#canvas.getBoundingClientRect()));
-    const created = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio, frameTime], [offscreen]);
-    this.#adapter = created.adapter;
+    this.#device = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio, frameTime], [offscreen]);
     await this.set(SCENE);
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
@@ -380,11 +382,11 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
       const offscreen = cover.transferControlToOffscreen();
       const [width, height] = pixels(this.#canvas.getBoundingClientRect());
       try {
-        const { adapter } = await this.#remote.call("restore", [offscreen, width, height, devicePixelRatio], [offscreen]);
+        this.#device = await this.#remote.call("restore", [offscreen, width, height, devicePixelRatio], [offscreen]);
         this.#cover?.remove();
         this.#canvas.after(cover);
-        [this.#cover, this.#adapter] = [cover, adapter];
-        this.#emit("restored", { adapter });
+        this.#cover = cover;
+        this.#emit("restored", { adapter: this.#device.adapter });
         return;
       } catch (again) {
         error = again;
@@ -414,9 +416,14 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
     return this.#info;
   }
 
-  /** The name of the GPU. */
+  /** The name of the GPU; empty where the browser does not say it. */
   get adapter(): string {
-    return this.#adapter;
+    return this.#device.adapter;
+  }
+
+  /** Whether the browser has no GPU to draw with, so that the processor draws, which is slower. */
+  get isSoftware(): boolean {
+    return this.#device.isSoftware;
   }
 
   /** What the colours mean; `undefined` where nothing is coloured by values. */

@@ -75,7 +75,7 @@ async function start() {
   const viewer = await makeViewer(listed);
   if (!viewer) return;
   demo.viewer = viewer;
-  $("gpu").textContent = viewer.adapter && `GPU: ${viewer.adapter}`;
+  showDevice(viewer);
   viewer.addEventListener("progress", ({ detail }) => showProgress(detail));
   viewer.addEventListener("stats", ({ detail }) => showStats(detail));
   viewer.addEventListener("frame", ({ detail }) => showFrame(detail));
@@ -161,6 +161,12 @@ async function makeViewer(listed) {
     say(unsupported ? "This page needs WebGPU" : "The viewer could not start", error);
     return undefined;
   }
+}
+
+/** What draws. @param {import("tetralod/viewer").Viewer} viewer */
+function showDevice({ adapter, isSoftware }) {
+  const words = isSoftware && "Drawn in software, since this browser uses no GPU: allow hardware acceleration in its settings, or update the graphics driver.";
+  $("gpu").textContent = [words, adapter && `GPU: ${adapter}`].filter(Boolean).join(" ");
 }
 
 /** What lies over the picture: axes, probes, the plot. @param {import("tetralod/viewer").Viewer} viewer */

@@ -6,7 +6,7 @@ import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./forma
 import { showHistogram } from "./histogram.js";
 import { showIdle } from "./idle.js";
 import { fail } from "./messages.js";
-import { demo, page } from "./page.js";
+import { demo, page, viewer } from "./page.js";
 import { budget, errorPixels } from "./request.js";
 import { originOf } from "./source.js";
 
@@ -26,7 +26,7 @@ export function showProgress({ bytes, total, complete, blocks }) {
   $("n-bytes").textContent = complete ? size(bytes) : amount;
 }
 
-/** How large the volume is, and how little of it has come. */
+/** How large the volume is, and how little of it has come; and what is not as fast as it could be. */
 export function showGrowth() {
   const { info, totalBytes, receivedBytes } = demo;
   if (!info) return;
@@ -36,7 +36,8 @@ export function showGrowth() {
   const origin = originOf();
   const before = origin ? `${size(origin.bytes)} as ${origin.format}` : `${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU`;
   const words = `${count(tetrahedra)} tetrahedra: ${before}${whole}, `;
-  $("growth").replaceChildren(words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched");
+  const software = viewer().isSoftware ? [element("small", {}, "No GPU: drawn in software", element("span", {}, ", coarser while something moves"))] : [];
+  $("growth").replaceChildren(words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched", ...software);
 }
 
 /** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. @param {import("tetralod").BlockProgress} blocks @param {number} bytes */

@@ -177,9 +177,9 @@ fn main() -> Result<()> {
     println!("### {}, {width} × {height}\n", renderer.description());
     drop(renderer);
     println!(
-        "| current tetrahedra | mode | triangles | compute ms | draw ms | pictures/s | GPU MB | bytes/tet |"
+        "| current tetrahedra | mode | triangles | compute ms | draw ms | pictures/s | quick ms | half as wide ms | GPU MB | bytes/tet |"
     );
-    println!("|--:|---|--:|--:|--:|--:|--:|--:|");
+    println!("|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|");
     for tets in &options.tets {
         for mode in MODES {
             let name = mode.split([',', ' ']).next().unwrap_or(mode);
@@ -228,15 +228,28 @@ fn measure(options: &Options, bytes: &[u8], tets: u32, mode: &str) -> Result<()>
     }
     let tets = session.mesh().map_or(0, |mesh| mesh.tet_count());
     let (compute, draw) = (median(computed), median(drawn));
-    let renderer = scene.renderer();
+    let bytes = [scene.renderer().gpu_bytes(), scene.renderer().mesh_bytes()].map(|bytes| bytes as f64);
+    scene.renderer_mut().set_quick(true);
+    let mut quick = [0.0; 2];
+    for (time, scale) in quick.iter_mut().zip([1.0, 0.5]) {
+        scene.renderer_mut().set_scale(scale);
+        let mut drawn = Vec::new();
+        for _ in 0..=options.pictures {
+            camera.orbit(0.05, 0.0);
+            drawn.push(picture(&mut scene, &mut session, &camera)?);
+        }
+        *time = median(drawn);
+    }
     println!(
-        "| {tets} | {mode} | {} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} |",
+        "| {tets} | {mode} | {} | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {:.1} | {:.1} |",
         scene.triangles(),
         1e3 * compute,
         1e3 * draw,
         1.0 / draw,
-        renderer.gpu_bytes() as f64 / 1e6,
-        renderer.mesh_bytes() as f64 / tets.max(1) as f64,
+        1e3 * quick[0],
+        1e3 * quick[1],
+        bytes[0] / 1e6,
+        bytes[1] / tets.max(1) as f64,
     );
     Ok(())
 }

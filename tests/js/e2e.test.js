@@ -38,6 +38,9 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   const [received, total, blocks] = [await demo(page, "receivedBytes"), await demo(page, "totalBytes"), await demo(page, "blocks")];
   assert.ok(received < total && blocks.here < blocks.all, `${received} of ${total} bytes for a part of the blocks`);
 
+  const isSoftware = await page.evaluate(() => window.tetralodDemo.viewer.isSoftware);
+  assert.equal((await page.innerText("#growth")).includes("drawn in software"), isSoftware, "it is said where there is no GPU");
+
   const surface = await picture(page, "isosurface");
   assertDrawn(surface);
   assertLike(surface, "isosurface");

@@ -40,6 +40,7 @@ export class Viewer extends EventTarget {
   }
 
   adapter = "none";
+  isSoftware = true;
   frameTime = 60;
   info = undefined;
   legend = undefined;

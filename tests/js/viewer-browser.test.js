@@ -391,6 +391,28 @@ test("where pictures take too long the mesh is coarser while something moves, an
   await page.close();
 });
 
+test("a viewer says whether it draws in software, and pictures have fewer pixels only while something moves", async () => {
+  const page = await opened({ frameTime: 1 });
+  const seen = await page.evaluate(async () => {
+    const { viewer, events } = window.tetralodDemo;
+    const scales = () => events.filter(({ name }) => name === "frame").map(({ detail }) => detail.scale);
+    await viewer.settled();
+    events.length = 0;
+    for (let i = 0; i < 300 && !scales().some((scale) => scale < 1); i++) {
+      await viewer.orbit(0.05, 0);
+      await new Promise(requestAnimationFrame);
+    }
+    const least = Math.min(...scales());
+    await viewer.settled();
+    const { info } = await navigator.gpu.requestAdapter();
+    return { least, last: scales().at(-1), said: viewer.isSoftware, is: info.isFallbackAdapter };
+  });
+  assert.ok(seen.least < 1, JSON.stringify(seen));
+  assert.equal(seen.last, 1);
+  assert.equal(seen.said, seen.is);
+  await page.close();
+});
+
 test("a GPU that is lost is opened again, and draws what it drew", async () => {
   const page = await opened();
   const show = (isosurfaces) => page.evaluate((scene) => window.tetralodDemo.viewer.set(scene), { isosurfaces, outline: false });

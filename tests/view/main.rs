@@ -18,6 +18,7 @@ mod mixed;
 mod mixed_pictures;
 mod pick;
 mod probe;
+mod quick;
 mod samples;
 mod scene_list;
 mod scene_pick;

@@ -35,7 +35,9 @@ the navigation to the first picture; for tetralod it shows the base mesh, in whi
 mesh within 5 % of the field's range. *full picture*: to the picture that does not change any more.
 The rows with 20 Mbit/s have a server that sends no faster, and answers after 40 ms. *memory*: of all processes of the browser with the
 full picture, less than those of an empty page. *frame*: from one picture to the next while the camera turns, 640 × 480 pixels,
-drawn in software, since the machine has no GPU: WebGL by VTK's programs, WebGPU by tetralod, whose pictures also have shade in hollows.
+drawn in software, since the machine has no GPU: WebGL by VTK's programs, WebGPU by tetralod. Where pictures take longer than 60 ms,
+tetralod draws those of a movement without shade in hollows and with one sample a pixel, then with fewer pixels, which the next row has. *with
+everything*: with shade and four samples a pixel, as at rest.
 
 ";
 

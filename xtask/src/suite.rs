@@ -276,6 +276,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("store.test.js"))?;
     shell::run(&mut node_test("pack.test.js"))?;
     shell::run(&mut node_test("latest.test.js"))?;
+    shell::run(&mut node_test("pace.test.js"))?;
     shell::run(&mut node_test("fit.test.js"))?;
     shell::run(&mut node_test("stored.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;

@@ -147,6 +147,12 @@ impl Viewer {
         self.scene.renderer().description()
     }
 
+    /// Whether the processor draws, and no GPU.
+    #[wasm_bindgen(getter, js_name = isSoftware)]
+    pub fn is_software(&self) -> bool {
+        self.scene.renderer().is_software()
+    }
+
     /// Forgets the volume, for another one, that is fed from front to back; what the user has set about the view goes with it.
     pub fn clear(&mut self, fields: Vec<String>) -> Result<(), WebError> {
         self.show_file(File::whole(fields))
@@ -491,6 +497,13 @@ impl Viewer {
     #[wasm_bindgen(js_name = setScale)]
     pub fn set_scale(&mut self, scale: f64) {
         self.scene.renderer_mut().set_scale(scale);
+        self.is_stale |= self.scene.renderer().drawn() == 0;
+    }
+
+    /// Draws the next pictures quickly, or as well as it can.
+    #[wasm_bindgen(js_name = setQuick)]
+    pub fn set_quick(&mut self, is_quick: bool) {
+        self.scene.renderer_mut().set_quick(is_quick);
         self.is_stale |= self.scene.renderer().drawn() == 0;
     }
 

@@ -37,7 +37,11 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   viewer.addEventListener("error", ({ detail }) => void detail.message);
   const { signal } = new AbortController();
   const first: ViewerState = { streamlines: { fields: ["u", "v", "w"], seeds: [] } };
-  const { info, dropped, finished }: OpenedVolume = await viewer.open("volume.mt", { fields: ["p"], signal, state: { ...first, boundary: null } });
+  const { info, dropped, finished }: OpenedVolume = await viewer.open("volume.mt", {
+    fields: ["p"],
+    signal,
+    state: { ...first, boundary: null },
+  });
   dropped.map(({ part, problem }: Misfit) => `${part}: ${problem}`) satisfies string[];
   await viewer.refine({ error: "1%" }, { signal });
   await Promise.all([viewer.settled({ signal }), viewer.isosurface(0.5, { signal }), viewer.screenshot({ signal })]);
@@ -92,7 +96,13 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const { percentiles } = await viewer.stats({ bins: 10, range: [0, 1], fractions: [0.02, 0.98] });
   const shots: Blob[] = [await viewer.screenshot(), await viewer.screenshot({ width: 9, height: 9, background: "light" })];
   [label, again?.size, along.at[0], percentiles[0], shots.length] satisfies (string | number | undefined)[];
-  const texts: string[] = [viewer.adapter, viewer.legend?.label ?? "", `${found?.values["p"]}`, await viewer.hash()];
+  const texts: string[] = [
+    viewer.adapter,
+    String(viewer.isSoftware satisfies boolean),
+    viewer.legend?.label ?? "",
+    `${found?.values["p"]}`,
+    await viewer.hash(),
+  ];
   texts.length satisfies number;
   viewer.free();
 }

@@ -1,10 +1,10 @@
 //! Draws tetrahedra as they are, or the points of the mesh.
 
-use crate::draw::{CellShape, CellStyle};
+use crate::draw::{CellShape, CellStyle, Lighting};
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::cell_parts::{edges, outer_faces};
 use crate::gpu::mesh::MeshBuffers;
-use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
+use crate::gpu::pipeline::{Binding, Common, Output, Pipeline, Variant, group, group_layout, uniform};
 use crate::gpu::style::StyleUniform;
 use crate::gpu::{Context, GpuError};
 use tetralod::geom::{SinglePoints, SingleValues};
@@ -12,10 +12,10 @@ use tetralod::view::MeshView;
 
 #[derive(Debug)]
 pub(super) struct CellPass {
-    solid: wgpu::RenderPipeline,
-    faces: wgpu::RenderPipeline,
-    wire: wgpu::RenderPipeline,
-    point: wgpu::RenderPipeline,
+    solid: Pipeline,
+    faces: Pipeline,
+    wire: Pipeline,
+    point: Pipeline,
     layout: wgpu::BindGroupLayout,
     uniform: wgpu::Buffer,
     style: CellStyle,
@@ -30,13 +30,11 @@ pub(super) struct CellPass {
 }
 
 impl CellPass {
-    pub(super) fn new(context: &Context, common: &Common) -> Self {
+    pub(super) fn new(context: &Context) -> Self {
         use Binding::{Uniform, Vertices};
         let layout = group_layout(context, "cells", &[Uniform, Vertices, Vertices, Vertices, Vertices]);
-        let groups = [Some(&layout)];
         let pipeline = |vertex, fragment, only_front| {
-            let output = Output::Opaque { only_front };
-            PipelineSpec::new("cells", [vertex, fragment], &groups, output).create(context, common)
+            Pipeline::new("cells", [vertex, fragment], &[&layout], Output::Opaque { only_front })
         };
         Self {
             solid: pipeline("vs", "fs", true),
@@ -106,7 +104,7 @@ impl CellPass {
     /// `has_clips`: whether clip planes cut anything.
     pub(super) fn draw(
         &self,
-        context: &Context,
+        (context, common): (&Context, &Common),
         mesh: &MeshBuffers,
         has_clips: bool,
         pass: &mut wgpu::RenderPass<'_>,
@@ -125,24 +123,29 @@ impl CellPass {
         pass.set_bind_group(1, &group(context, &self.layout, &[uniform, points, tets, values, parts]), &[]);
         let parts = if self.has_parts { self.parts.len() as u32 } else { 0 };
         // Shrunk ones and those that clip planes cut open show faces that others hide.
-        let is_whole =
-            self.style.shape == CellShape::Solid(0.0) && !(has_clips && self.style.style.clips != 0);
+        let mut variant = Variant::new(&self.style.style, has_clips);
+        let is_whole = self.style.shape == CellShape::Solid(0.0) && !variant.has_clips;
+        // Smooth light takes normals, which points do not have.
+        if variant.light == Lighting::Smooth {
+            variant.light = Lighting::Flat;
+        }
+        let mut set = |pipeline: &Pipeline| pass.set_pipeline(pipeline.get(context, common, Some(variant)));
         let corners = 12 * mesh.corners.buffer.len() as u32;
         match self.style.shape {
             CellShape::Solid(_) if is_whole => {
-                pass.set_pipeline(&self.faces);
+                set(&self.faces);
                 pass.draw(0..3 * parts, 0..1);
             }
             CellShape::Solid(_) => {
-                pass.set_pipeline(&self.solid);
+                set(&self.solid);
                 pass.draw(0..corners, 0..1);
             }
             CellShape::Wire => {
-                pass.set_pipeline(&self.wire);
+                set(&self.wire);
                 pass.draw(0..2 * parts, 0..1);
             }
             CellShape::Points(_) => {
-                pass.set_pipeline(&self.point);
+                set(&self.point);
                 pass.draw(0..6, 0..mesh.points.len() as u32);
             }
         }

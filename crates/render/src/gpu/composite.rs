@@ -3,7 +3,7 @@
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::mesh::MeshBuffers;
-use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
+use crate::gpu::pipeline::{Binding, Common, Output, Pipeline, group, group_layout, uniform};
 use crate::gpu::{Context, GpuError};
 use tetralod::geom::SingleValues;
 use tetralod::mesh::NONE;
@@ -26,9 +26,8 @@ const OUTSIDE: [u32; 3] = [NONE, 0, 0];
 
 #[derive(Debug)]
 pub(super) struct Composite {
-    /// Made when they are needed first: they take longer to compile than all others.
-    entries: Option<wgpu::RenderPipeline>,
-    all: Option<wgpu::RenderPipeline>,
+    entries: Pipeline,
+    all: Pipeline,
     entries_layout: wgpu::BindGroupLayout,
     layout: wgpu::BindGroupLayout,
     medium: GrowBuffer<[f32; 4]>,
@@ -45,8 +44,13 @@ pub(super) struct Composite {
 }
 
 impl Composite {
-    pub(super) fn new(context: &Context) -> Self {
+    pub(super) fn new(context: &Context, lists: &wgpu::BindGroupLayout) -> Self {
         use Binding::{Both, Depths, Read, Uniform};
+        let entries_layout = group_layout(context, "entries of the volume", &[Both, Both]);
+        let bindings = [Read, Read, Read, Read, Read, Read, Uniform, Depths];
+        let layout = group_layout(context, "composite", &bindings);
+        let listed = Output::List { only_front: true };
+        let over = Output::Over(wgpu::CompareFunction::Always);
         let nothing = context.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("nothing"),
             size: 64,
@@ -54,14 +58,10 @@ impl Composite {
             mapped_at_creation: false,
         });
         Self {
-            entries: None,
-            all: None,
-            entries_layout: group_layout(context, "entries of the volume", &[Both, Both]),
-            layout: group_layout(
-                context,
-                "composite",
-                &[Read, Read, Read, Read, Read, Read, Uniform, Depths],
-            ),
+            entries: Pipeline::new("volume_entries", ["vs", "fs"], &[&entries_layout, lists], listed),
+            all: Pipeline::new("composite", ["vs", "fs"], &[&layout], over),
+            entries_layout,
+            layout,
             medium: GrowBuffer::new("entries of the transfer function", wgpu::BufferUsages::STORAGE),
             table: [0.0; 4],
             corners: [0; 4],
@@ -106,23 +106,16 @@ impl Composite {
         });
     }
 
-    /// Makes the pipelines that are needed and are not there yet.
-    pub(super) fn prepare(&mut self, context: &Context, common: &Common, lists: &FragmentLists) {
-        let over = Output::Over(wgpu::CompareFunction::Always);
-        let groups = [Some(&self.layout)];
-        let spec = PipelineSpec::new("composite", ["vs", "fs"], &groups, over);
-        self.all.get_or_insert_with(|| spec.create(context, common));
-        let groups = [Some(&self.entries_layout), Some(&lists.layout)];
-        let output = Output::List { only_front: true };
-        let spec = PipelineSpec::new("volume_entries", ["vs", "fs"], &groups, output);
-        self.entries.get_or_insert_with(|| spec.create(context, common));
-    }
-
     /// Lists where rays enter the volume.
-    pub(super) fn list(&self, context: &Context, mesh: &MeshBuffers, pass: &mut wgpu::RenderPass<'_>) {
+    pub(super) fn list(
+        &self,
+        (context, common): (&Context, &Common),
+        mesh: &MeshBuffers,
+        pass: &mut wgpu::RenderPass<'_>,
+    ) {
         let (Some(points), Some(faces)) = (mesh.points.binding(), mesh.faces.binding()) else { return };
-        if let (true, Some(pipeline)) = (self.has_volume(), &self.entries) {
-            pass.set_pipeline(pipeline);
+        if self.has_volume() {
+            pass.set_pipeline(self.entries.get(context, common, None));
             pass.set_bind_group(1, &group(context, &self.entries_layout, &[points, faces]), &[]);
             pass.draw(0..3 * mesh.faces.len() as u32, 0..1);
         }
@@ -131,13 +124,12 @@ impl Composite {
     /// Draws all that is listed.
     pub(super) fn draw(
         &self,
-        context: &Context,
+        (context, common): (&Context, &Common),
         mesh: &MeshBuffers,
         lists: &FragmentLists,
         depth: &wgpu::TextureView,
         pass: &mut wgpu::RenderPass<'_>,
     ) {
-        let Some(pipeline) = &self.all else { return };
         let parts = [mesh.points.binding(), mesh.faces.binding(), mesh.linked.buffer.binding()];
         let is_whole = self.has_volume() && parts.iter().all(Option::is_some);
         let [id, value, _] = self.start;
@@ -156,7 +148,7 @@ impl Composite {
         let medium = or_nothing(self.medium.binding());
         let (uniform, depth) = (self.uniform.as_entire_binding(), wgpu::BindingResource::TextureView(depth));
         let resources = [points, faces, tets, medium, heads, nodes, uniform, depth];
-        pass.set_pipeline(pipeline);
+        pass.set_pipeline(self.all.get(context, common, None));
         pass.set_bind_group(1, &group(context, &self.layout, &resources), &[]);
         pass.draw(0..3, 0..1);
     }

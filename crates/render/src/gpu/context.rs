@@ -133,6 +133,11 @@ impl Context {
         if is_storage { largest.min(limits.max_storage_buffer_binding_size) } else { largest }
     }
 
+    /// Whether the processor draws, and no GPU.
+    pub(super) fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
     /// The GPU and its driver in words.
     pub fn description(&self) -> String {
         let info = self.adapter.get_info();

@@ -1,8 +1,10 @@
 //! What all pipelines have in common: the uniform `frame`, groups of bindings, depth, samples.
 
+use crate::draw::{Colouring, Lighting, Style};
 use crate::gpu::target::DEPTH;
 use crate::gpu::types::Frame;
 use crate::gpu::{Context, SAMPLES, SHADERS};
+use std::sync::OnceLock;
 use wgpu::{BindingType, BufferBindingType, ShaderStages};
 
 /// The uniform of a frame, and the formats of a picture.
@@ -11,8 +13,11 @@ pub(super) struct Common {
     buffer: wgpu::Buffer,
     pub(super) group: wgpu::BindGroup,
     layout: wgpu::BindGroupLayout,
-    /// Of the picture that is drawn.
+    /// Of the picture that is drawn, with its samples a pixel.
     pub(super) format: wgpu::TextureFormat,
+    pub(super) samples: u32,
+    /// Of the shaders, made when they are needed first.
+    modules: [OnceLock<wgpu::ShaderModule>; SHADERS.len()],
 }
 
 /// The kinds of bindings that shaders have.
@@ -106,7 +111,17 @@ impl Common {
         let buffer = uniform::<Frame>(context, "frame");
         let layout = group_layout(context, "frame", &[Binding::Uniform]);
         let group = group(context, &layout, &[buffer.as_entire_binding()]);
-        Self { buffer, group, layout, format }
+        Self { buffer, group, layout, format, samples: SAMPLES, modules: Default::default() }
+    }
+
+    fn module(&self, context: &Context, shader: &'static str) -> &wgpu::ShaderModule {
+        let number = SHADERS.iter().position(|(name, _)| *name == shader).unwrap_or_default();
+        self.modules[number].get_or_init(|| {
+            context.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(shader),
+                source: wgpu::ShaderSource::Wgsl(SHADERS[number].1.into()),
+            })
+        })
     }
 
     pub(super) fn write(&self, context: &Context, frame: &Frame) {
@@ -149,62 +164,130 @@ pub(super) fn begin_pass<'a>(
     })
 }
 
-/// How one pipeline differs from the others.
-#[derive(Clone, Copy)]
-pub(super) struct PipelineSpec<'a> {
-    pub shader: &'static str,
-    pub vertex: &'static str,
-    pub fragment: &'static str,
-    pub buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
-    /// What shaders reach beside the frame: groups 1 and 2.
-    pub groups: &'a [Option<&'a wgpu::BindGroupLayout>],
-    pub output: Output,
-}
-
 /// The format of the attachment of passes that write lists alone.
 pub(super) const UNUSED: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 
-impl<'a> PipelineSpec<'a> {
+/// What a style takes of the shaders of surfaces and tetrahedra. They are compiled for it: software goes through both sides of each branch.
+/// Twin: the constants at the top of `shading.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Variant {
+    pub light: Lighting,
+    /// Whether values give colours.
+    pub has_values: bool,
+    pub has_edges: bool,
+    pub has_clips: bool,
+}
+
+impl Variant {
+    const COUNT: usize = 24;
+
+    /// That of a style, in pictures with clip planes or without.
+    pub(super) fn new(style: &Style, has_clips: bool) -> Self {
+        Self {
+            light: style.lighting,
+            has_values: matches!(style.colouring, Colouring::Scale(_)),
+            has_edges: style.edges.is_some_and(|edges| edges.width > 0.0),
+            has_clips: has_clips && style.clips != 0,
+        }
+    }
+
+    fn number(self) -> usize {
+        let flags = [self.has_values, self.has_edges, self.has_clips];
+        flags.iter().fold(self.light as usize, |number, flag| 2 * number + usize::from(*flag))
+    }
+
+    fn constants(self) -> [(&'static str, f64); 4] {
+        let flag = |is_so: bool| f64::from(u8::from(is_so));
+        [
+            ("LIGHT", f64::from(self.light as u8)),
+            ("HAS_VALUES", flag(self.has_values)),
+            ("HAS_EDGES", flag(self.has_edges)),
+            ("HAS_CLIPS", flag(self.has_clips)),
+        ]
+    }
+}
+
+/// A pipeline, and how it differs from the others. It is made when something is drawn with it first, for each number of samples and each
+/// variant: to compile one takes a while.
+#[derive(Debug)]
+pub(super) struct Pipeline {
+    shader: &'static str,
+    vertex: &'static str,
+    fragment: &'static str,
+    buffers: &'static [Option<wgpu::VertexBufferLayout<'static>>],
+    /// What shaders reach beside the frame: groups 1 and 2.
+    groups: Vec<wgpu::BindGroupLayout>,
+    output: Output,
+    /// With one sample, then with all of them: without a variant, then each of them.
+    made: Vec<OnceLock<wgpu::RenderPipeline>>,
+}
+
+impl Pipeline {
     /// A pipeline without buffers of vertices.
     pub(super) fn new(
         shader: &'static str,
         [vertex, fragment]: [&'static str; 2],
-        groups: &'a [Option<&'a wgpu::BindGroupLayout>],
+        groups: &[&wgpu::BindGroupLayout],
         output: Output,
     ) -> Self {
-        Self { shader, vertex, fragment, buffers: &[], groups, output }
+        let groups = groups.iter().map(|&layout| layout.clone()).collect();
+        let made = vec![OnceLock::new(); 2 * (Variant::COUNT + 1)];
+        Self { shader, vertex, fragment, buffers: &[], groups, output, made }
     }
 
-    pub(super) fn create(&self, context: &Context, common: &Common) -> wgpu::RenderPipeline {
-        let source = SHADERS.iter().find(|(name, _)| *name == self.shader).map_or("", |(_, source)| source);
-        let module = context.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(self.shader),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
-        let mut groups = vec![Some(&common.layout)];
-        groups.extend(self.groups);
+    /// The same with these buffers.
+    pub(super) fn with_buffers(self, buffers: &'static [Option<wgpu::VertexBufferLayout<'static>>]) -> Self {
+        Self { buffers, ..self }
+    }
+
+    /// It, for pictures with the samples that `common` says; of the variant, if its shader has some.
+    pub(super) fn get(
+        &self,
+        context: &Context,
+        common: &Common,
+        variant: Option<Variant>,
+    ) -> &wgpu::RenderPipeline {
+        let samples = if self.has_depth() { common.samples } else { 1 };
+        let number = variant.map_or(0, |variant| variant.number() + 1);
+        let place = number + if samples == 1 { 0 } else { Variant::COUNT + 1 };
+        self.made[place].get_or_init(|| self.create(context, common, samples, variant))
+    }
+
+    fn create(
+        &self,
+        context: &Context,
+        common: &Common,
+        samples: u32,
+        variant: Option<Variant>,
+    ) -> wgpu::RenderPipeline {
+        let module = common.module(context, self.shader);
+        let groups: Vec<_> = [&common.layout].into_iter().chain(&self.groups).map(Some).collect();
         let layout = context.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.shader),
             bind_group_layouts: &groups,
             immediate_size: 0,
         });
-        let samples = if self.has_depth() { SAMPLES } else { 1 };
+        let constants = variant.map(Variant::constants);
+        let compilation_options = wgpu::PipelineCompilationOptions {
+            constants: constants.as_ref().map_or(&[], |constants| constants),
+            ..Default::default()
+        };
         context.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.fragment),
             layout: Some(&layout),
             vertex: wgpu::VertexState {
-                module: &module,
+                module,
                 entry_point: Some(self.vertex),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: compilation_options.clone(),
                 buffers: self.buffers,
             },
             primitive: wgpu::PrimitiveState { cull_mode: self.culled(), ..Default::default() },
             depth_stencil: self.has_depth().then(|| self.depth()),
             multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
             fragment: Some(wgpu::FragmentState {
-                module: &module,
+                module,
                 entry_point: Some(self.fragment),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options,
                 targets: &[Some(self.target(common.format))],
             }),
             multiview_mask: None,

@@ -6,14 +6,14 @@ use crate::gpu::composite::Composite;
 use crate::gpu::error::Result;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::mesh::MeshBuffers;
-use crate::gpu::pipeline::{Common, Output, PipelineSpec};
+use crate::gpu::pipeline::{Common, Output, Pipeline};
 use crate::gpu::present::{PictureView, Presenter};
 use crate::gpu::shade::ShadePass;
 use crate::gpu::surface::{Surface, SurfacePipelines};
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
 use crate::gpu::wire::WirePass;
-use crate::gpu::{Context, GpuError};
+use crate::gpu::{Context, GpuError, SAMPLES};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ pub struct Renderer {
     pub(super) context: Context,
     pub(super) target: Target,
     common: Common,
-    background: wgpu::RenderPipeline,
+    background: Pipeline,
     surface_pipelines: SurfacePipelines,
     surfaces: BTreeMap<u32, Surface>,
     mesh: MeshBuffers,
@@ -50,6 +50,7 @@ pub struct Renderer {
     shade: Option<ShadePass>,
     wire: WirePass,
     presenter: Presenter,
+    pub(super) is_quick: bool,
     /// Pictures that the device has not finished.
     in_flight: Arc<AtomicU32>,
     /// What the last picture showed, and of how many it is the mean.
@@ -93,21 +94,22 @@ impl Renderer {
     fn new(context: Context, target: Target) -> Result<Self> {
         let common = Common::new(&context, target.format);
         let over = Output::Over(wgpu::CompareFunction::Always);
-        let background = PipelineSpec::new("background", ["vs", "fs"], &[], over);
+        let lists = FragmentLists::new(&context);
         let renderer = Self {
-            background: background.create(&context, &common),
-            surface_pipelines: SurfacePipelines::new(&context, &common),
+            background: Pipeline::new("background", ["vs", "fs"], &[], over),
+            surface_pipelines: SurfacePipelines::new(&context, &lists.layout),
             surfaces: BTreeMap::new(),
             mesh: MeshBuffers::new(),
             points: SinglePoints::PLAIN,
             values: SingleValues::PLAIN,
             cells: None,
             shows_cells: false,
-            lists: FragmentLists::new(&context),
-            composite: Composite::new(&context),
+            composite: Composite::new(&context, &lists.layout),
+            wire: WirePass::new(&context, &lists.layout),
+            lists,
             shade: None,
-            wire: WirePass::new(&context, &common),
             presenter: Presenter::new(&context, &common),
+            is_quick: false,
             in_flight: Arc::default(),
             last: None,
             beside: None,
@@ -147,6 +149,11 @@ impl Renderer {
         self.context.description()
     }
 
+    /// Whether the processor draws, and no GPU.
+    pub fn is_software(&self) -> bool {
+        self.context.is_software()
+    }
+
     /// Width and height of the target in pixels.
     pub fn size(&self) -> [u32; 2] {
         self.target.size
@@ -169,6 +176,15 @@ impl Renderer {
         let before = self.target.drawn_size;
         self.target.scale(&self.context, if scale.is_finite() { scale.clamp(0.1, 1.0) } else { 1.0 });
         if self.target.drawn_size != before {
+            self.last = None;
+        }
+    }
+
+    /// Draws the next pictures quickly, or as well as it can: quick ones have no shade in hollows, and where all is opaque one sample
+    /// a pixel. They are no part of a mean.
+    pub fn set_quick(&mut self, is_quick: bool) {
+        if is_quick != self.is_quick {
+            self.is_quick = is_quick;
             self.last = None;
         }
     }
@@ -286,9 +302,9 @@ impl Renderer {
     }
 
     fn cells_mut(&mut self) -> (&mut CellPass, &Context) {
-        let (context, common) = (&self.context, &self.common);
+        let context = &self.context;
         let cells = self.cells.get_or_insert_with(|| {
-            let mut cells = CellPass::new(context, common);
+            let mut cells = CellPass::new(context);
             cells.set_stored(context, self.points, self.values);
             cells
         });
@@ -444,7 +460,7 @@ impl Renderer {
         if let Some(Picture::Canvas(texture)) = picture {
             self.context.queue.present(texture);
         }
-        self.last = Some((*camera, look.clone(), count + 1));
+        self.last = (!self.is_quick).then(|| (*camera, look.clone(), count + 1));
         self.context.check()?;
         Ok(true)
     }
@@ -459,6 +475,7 @@ impl Renderer {
         }
         other.resize([width, height]);
         other.set_scale(f64::from(drawn) / f64::from(width));
+        other.set_quick(self.is_quick);
         other.encode(&PictureView { view, part: Some([0, 0, part, height]) }, camera, look, count);
     }
 
@@ -472,28 +489,35 @@ impl Renderer {
     fn encode(&mut self, view: &PictureView<'_>, camera: &Camera, look: &Look, count: u32) {
         let look = &self.scaled(look).relative_to(&self.points);
         let camera = camera.relative_to(&self.points);
+        let has_lists = self.composite.has_volume() || self.surfaces.values().any(Surface::is_listed);
+        self.common.samples = if self.is_quick && !has_lists { 1 } else { SAMPLES };
+        self.target.set_samples(&self.context, self.common.samples);
         let frame = Frame::new(&camera, look, self.target.drawn_size, shift(count));
         self.common.write(&self.context, &frame);
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = self.context.device.create_command_encoder(&descriptor);
-        let has_lists = self.composite.has_volume() || self.surfaces.values().any(Surface::is_listed);
-        let has_shade = look.shade[0] > 0.0 && self.has_opaque();
+        let has_shade = look.shade[0] > 0.0 && !self.is_quick && self.has_opaque();
         let has_more = has_lists || has_shade;
+        let has_clips = !look.clips.is_empty();
         if has_lists {
-            self.composite.prepare(&self.context, &self.common, &self.lists);
-            self.list(&mut encoder);
+            self.list(&mut encoder, has_clips);
         } else {
             self.lists.clear();
         }
-        self.opaque(&mut encoder, !look.clips.is_empty(), has_more);
+        // What is not changed on the way to where it is seen is drawn there.
+        let is_direct = self.common.samples == 1 && self.target.is_whole() && view.part.is_none();
+        self.opaque(&mut encoder, is_direct.then_some(view.view), has_clips, has_more);
         if has_shade {
             self.find_shade(&mut encoder, look.shade);
         }
         if has_more {
             self.over(&mut encoder, has_shade, has_lists);
         }
-        let images = &self.target.images;
-        self.presenter.present(&self.context, &mut encoder, &self.common, images, count, view);
+        if !is_direct {
+            let images = &self.target.images;
+            let count = (!self.is_quick).then_some(count);
+            self.presenter.present(&self.context, &mut encoder, &self.common, images, count, view);
+        }
         if has_lists {
             self.lists.copy_count(&mut encoder);
         }
@@ -509,15 +533,13 @@ impl Renderer {
     }
 
     /// Fills the lists of what is not opaque.
-    fn list(&mut self, encoder: &mut wgpu::CommandEncoder) {
-        let (context, common) = (&self.context, &self.common);
-        self.surface_pipelines.prepare_lists(context, common, &self.lists.layout);
-        self.wire.prepare_lists(context, common, &self.lists.layout);
-        let mut pass = self.lists.begin(context, encoder, self.target.drawn_size);
-        pass.set_bind_group(0, &common.group, &[]);
-        self.composite.list(context, &self.mesh, &mut pass);
-        self.surface_pipelines.draw(&mut pass, self.surfaces.values(), true);
-        self.wire.list(&mut pass);
+    fn list(&mut self, encoder: &mut wgpu::CommandEncoder, has_clips: bool) {
+        let with = (&self.context, &self.common);
+        let mut pass = self.lists.begin(with.0, encoder, self.target.drawn_size);
+        pass.set_bind_group(0, &self.common.group, &[]);
+        self.composite.list(with, &self.mesh, &mut pass);
+        self.surface_pipelines.draw(with, &mut pass, self.surfaces.values(), true, has_clips);
+        self.wire.list(with, &mut pass);
     }
 
     /// Whether anything is drawn that shade can fall on.
@@ -529,21 +551,31 @@ impl Renderer {
     fn find_shade(&mut self, encoder: &mut wgpu::CommandEncoder, shade: [f32; 2]) {
         let (context, common) = (&self.context, &self.common);
         let drawn = (self.target.drawn_size, &self.target.images.depth);
-        let pass = self.shade.get_or_insert_with(|| ShadePass::new(context, common));
+        let pass = self.shade.get_or_insert_with(|| ShadePass::new(context));
         pass.find(context, encoder, common, drawn, shade);
     }
 
-    /// Draws what is opaque; if nothing comes after it also the lines over it.
-    fn opaque(&self, encoder: &mut wgpu::CommandEncoder, has_clips: bool, has_more: bool) {
-        let images = &self.target.images;
+    /// Draws what is opaque, with one sample also to `direct`; if nothing comes after it also the lines over it.
+    fn opaque(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        direct: Option<&wgpu::TextureView>,
+        has_clips: bool,
+        has_more: bool,
+    ) {
+        let (with, images) = ((&self.context, &self.common), &self.target.images);
+        let whole = direct.unwrap_or(&images.resolved);
         let stored = if has_more { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("opaque"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &images.samples,
+                view: images.samples.as_ref().unwrap_or(whole),
                 depth_slice: None,
-                resolve_target: (!has_more).then_some(&images.resolved),
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: stored },
+                resolve_target: images.samples.as_ref().filter(|_| !has_more).map(|_| whole),
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: if images.samples.is_some() { stored } else { wgpu::StoreOp::Store },
+                },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &images.depth,
@@ -553,24 +585,25 @@ impl Renderer {
             ..Default::default()
         });
         pass.set_bind_group(0, &self.common.group, &[]);
-        pass.set_pipeline(&self.background);
+        pass.set_pipeline(self.background.get(with.0, with.1, None));
         pass.draw(0..3, 0..1);
-        self.surface_pipelines.draw(&mut pass, self.surfaces.values(), false);
+        self.surface_pipelines.draw(with, &mut pass, self.surfaces.values(), false, has_clips);
         if let (true, Some(cells)) = (self.shows_cells, &self.cells) {
-            cells.draw(&self.context, &self.mesh, has_clips, &mut pass);
+            cells.draw(with, &self.mesh, has_clips, &mut pass);
         }
         if !has_more {
-            self.wire.draw(&mut pass, false);
+            self.wire.draw(with, &mut pass, false);
         }
     }
 
     /// Lays shade over it, then what is not opaque.
     fn over(&self, encoder: &mut wgpu::CommandEncoder, has_shade: bool, has_lists: bool) {
-        let images = &self.target.images;
+        let (with, images) = ((&self.context, &self.common), &self.target.images);
+        let Some(samples) = &images.samples else { return };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("composite"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &images.samples,
+                view: samples,
                 depth_slice: None,
                 resolve_target: Some(&images.resolved),
                 ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Discard },
@@ -585,12 +618,12 @@ impl Renderer {
         });
         pass.set_bind_group(0, &self.common.group, &[]);
         if let Some(shade) = self.shade.as_ref().filter(|_| has_shade) {
-            shade.draw(&self.context, &images.depth, &mut pass);
+            shade.draw(with, &images.depth, &mut pass);
         }
         if has_lists {
-            self.composite.draw(&self.context, &self.mesh, &self.lists, &images.depth, &mut pass);
+            self.composite.draw(with, &self.mesh, &self.lists, &images.depth, &mut pass);
         }
-        self.wire.draw(&mut pass, has_lists);
+        self.wire.draw(with, &mut pass, has_lists);
     }
 
     /// Draws a picture that is the mean of `samples` pictures, and reads it back: `RGBA` bytes, premultiplied, rows from top to

@@ -1,7 +1,7 @@
 //! Shade in hollows: takes light away from what is opaque, by what is near it on the screen. See `shade.wgsl`.
 
 use crate::gpu::Context;
-use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, begin_pass, group, group_layout, uniform};
+use crate::gpu::pipeline::{Binding, Common, Output, Pipeline, begin_pass, group, group_layout, uniform};
 use crate::gpu::target::{image, image_bytes};
 
 /// Of the shade of each pixel, and the depth that it is for.
@@ -17,9 +17,9 @@ struct Settings {
 /// Made when shade is drawn first.
 #[derive(Debug)]
 pub(super) struct ShadePass {
-    find: wgpu::RenderPipeline,
+    find: Pipeline,
     /// For the nearest surface in a pixel, and for what is behind it.
-    apply: [wgpu::RenderPipeline; 2],
+    apply: [Pipeline; 2],
     /// Of both steps: the second one also reads what the first one has found.
     layouts: [wgpu::BindGroupLayout; 2],
     uniform: wgpu::Buffer,
@@ -27,14 +27,14 @@ pub(super) struct ShadePass {
 }
 
 impl ShadePass {
-    pub(super) fn new(context: &Context, common: &Common) -> Self {
+    pub(super) fn new(context: &Context) -> Self {
         use Binding::{Depths, Numbers, Uniform};
         let layouts = [
             group_layout(context, "shade", &[Uniform, Depths]),
             group_layout(context, "shade that was found", &[Uniform, Depths, Numbers]),
         ];
         let pipeline = |layout: &wgpu::BindGroupLayout, fragment, output| {
-            PipelineSpec::new("shade", ["vs", fragment], &[Some(layout)], output).create(context, common)
+            Pipeline::new("shade", ["vs", fragment], &[layout], output)
         };
         let over = Output::Over(wgpu::CompareFunction::Always);
         Self {
@@ -72,20 +72,25 @@ impl ShadePass {
         let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
         let mut pass = begin_pass(encoder, "shade", found, clear, wgpu::StoreOp::Store);
         let resources = [self.uniform.as_entire_binding(), wgpu::BindingResource::TextureView(depth)];
-        pass.set_pipeline(&self.find);
+        pass.set_pipeline(self.find.get(context, common, None));
         pass.set_bind_group(0, &common.group, &[]);
         pass.set_bind_group(1, &group(context, &self.layouts[0], &resources), &[]);
         pass.draw(0..3, 0..1);
     }
 
     /// Lays the shade that was found over what is opaque.
-    pub(super) fn draw(&self, context: &Context, depth: &wgpu::TextureView, pass: &mut wgpu::RenderPass<'_>) {
+    pub(super) fn draw(
+        &self,
+        (context, common): (&Context, &Common),
+        depth: &wgpu::TextureView,
+        pass: &mut wgpu::RenderPass<'_>,
+    ) {
         let Some(found) = &self.found else { return };
         let view = wgpu::BindingResource::TextureView;
         let resources = [self.uniform.as_entire_binding(), view(depth), view(found)];
         pass.set_bind_group(1, &group(context, &self.layouts[1], &resources), &[]);
         for pipeline in &self.apply {
-            pass.set_pipeline(pipeline);
+            pass.set_pipeline(pipeline.get(context, common, None));
             pass.draw(0..3, 0..1);
         }
     }

@@ -4,7 +4,7 @@ use crate::draw::Look;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::target::Target;
 use crate::gpu::{Context, GpuError, Renderer};
-use std::mem::swap;
+use std::mem::{replace, swap};
 use tetralod::geom::Camera;
 
 /// Another target of a renderer, with lists of its own: a large picture must not make those of the canvas large.
@@ -49,11 +49,13 @@ impl Renderer {
         let look = Look { pixel_ratio: look.pixel_ratio * scale, ..look.clone() };
         swap(&mut self.target, &mut side.target);
         swap(&mut self.lists, &mut side.lists);
+        let is_quick = replace(&mut self.is_quick, false);
         let first = self.draw(camera, &look);
         let others = (1..samples).map(|_| self.draw_again());
         let drawn = std::iter::once(first).chain(others).find(Result::is_err);
         swap(&mut self.target, &mut side.target);
         swap(&mut self.lists, &mut side.lists);
+        self.is_quick = is_quick;
         // It was not of the own target.
         self.last = None;
         drawn.map_or(Ok(()), |error| error.map(|_| ()))

@@ -1,6 +1,6 @@
 //! The uniform of how a thing is drawn, in the layout of the shaders.
 
-use crate::draw::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, Style};
+use crate::draw::{CellShape, CellStyle, Colouring, EdgeLook, Style};
 use crate::gpu::types::plane;
 use tetralod::geom::{SinglePoints, SingleValues};
 use tetralod::view::ColourScale;
@@ -27,19 +27,13 @@ impl StyleUniform {
             Colouring::Scale(scale) => ([[0.0; 3]; 2], terms(scale, values), scale.table()),
         };
         let [front, back] = sides.map(|side| side.map(linear));
-        let is_mapped = f32::from(matches!(style.colouring, Colouring::Scale(_)) as u8);
         let edges = style.edges.unwrap_or(EdgeLook { colour: [0.0; 4], width: 0.0 });
-        let light = match style.lighting {
-            Lighting::Smooth => 0.0,
-            Lighting::Flat => 1.0,
-            Lighting::None => 2.0,
-        };
         Self {
             front: [front[0], front[1], front[2], style.opacity.clamp(0.0, 1.0)],
-            back: [back[0], back[1], back[2], is_mapped],
+            back: [back[0], back[1], back[2], 0.0],
             scale,
             edge: edges.colour,
-            shape: [edges.width, light, 0.0, 0.0],
+            shape: [edges.width, 0.0, 0.0, 0.0],
             clips: [style.clips, 0, 0, 0],
             cut: [0.0, 0.0, 0.0, f32::INFINITY],
             palette,
@@ -49,8 +43,6 @@ impl StyleUniform {
     /// The style of tetrahedra with points and values that are stored like this.
     pub(super) fn of_cells(cells: &CellStyle, points: &SinglePoints, values: &SingleValues) -> Self {
         let mut uniform = Self::of_surface(&cells.style, values);
-        // Smooth light takes normals, which points do not have.
-        uniform.shape[1] = uniform.shape[1].max(1.0);
         match cells.shape {
             CellShape::Solid(shrunk) => uniform.shape[2] = shrunk.clamp(0.0, 0.95),
             CellShape::Points(diameter) => uniform.shape[3] = diameter,

@@ -2,7 +2,7 @@
 
 use crate::draw::Style;
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
+use crate::gpu::pipeline::{Binding, Common, Output, Pipeline, Variant, group, group_layout, uniform};
 use crate::gpu::style::StyleUniform;
 use crate::gpu::{Context, GpuError};
 use tetralod::geom::{SinglePoints, SingleValues};
@@ -11,8 +11,8 @@ use tetralod::view::{SurfaceChanges, Triangles};
 /// The pipelines of all surfaces.
 #[derive(Debug)]
 pub(super) struct SurfacePipelines {
-    opaque: wgpu::RenderPipeline,
-    listed: Option<wgpu::RenderPipeline>,
+    opaque: Pipeline,
+    listed: Pipeline,
     layout: wgpu::BindGroupLayout,
 }
 
@@ -31,38 +31,29 @@ pub(super) struct Surface {
 }
 
 impl SurfacePipelines {
-    pub(super) fn new(context: &Context, common: &Common) -> Self {
+    pub(super) fn new(context: &Context, lists: &wgpu::BindGroupLayout) -> Self {
         use Binding::{Uniform, Vertices};
         let layout = group_layout(context, "surface", &[Uniform, Vertices, Vertices, Vertices, Vertices]);
-        let (groups, output) = ([Some(&layout)], Output::Opaque { only_front: false });
-        let opaque = PipelineSpec::new("surface", ["vs", "fs"], &groups, output).create(context, common);
-        Self { opaque, listed: None, layout }
+        let (opaque, listed) = (Output::Opaque { only_front: false }, Output::List { only_front: false });
+        let opaque = Pipeline::new("surface", ["vs", "fs"], &[&layout], opaque);
+        let listed = Pipeline::new("surface", ["vs", "fs_list"], &[&layout, lists], listed);
+        Self { opaque, listed, layout }
     }
 
-    /// Makes what surfaces with opacity take, once.
-    pub(super) fn prepare_lists(
-        &mut self,
-        context: &Context,
-        common: &Common,
-        lists: &wgpu::BindGroupLayout,
-    ) {
-        let groups = [Some(&self.layout), Some(lists)];
-        let output = Output::List { only_front: false };
-        let spec = PipelineSpec::new("surface", ["vs", "fs_list"], &groups, output);
-        self.listed.get_or_insert_with(|| spec.create(context, common));
-    }
-
+    /// `has_clips`: whether clip planes cut anything.
     pub(super) fn draw<'a>(
         &self,
+        (context, common): (&Context, &Common),
         pass: &mut wgpu::RenderPass<'_>,
         surfaces: impl Iterator<Item = &'a Surface>,
         are_listed: bool,
+        has_clips: bool,
     ) {
-        let pipeline = if are_listed { self.listed.as_ref() } else { Some(&self.opaque) };
-        let Some(pipeline) = pipeline else { return };
-        pass.set_pipeline(pipeline);
+        let pipeline = if are_listed { &self.listed } else { &self.opaque };
         for surface in surfaces.filter(|surface| surface.is_listed() == are_listed) {
             if let Some(group) = &surface.group {
+                let variant = Variant::new(&surface.style, has_clips);
+                pass.set_pipeline(pipeline.get(context, common, Some(variant)));
                 pass.set_bind_group(1, group, &[]);
                 pass.draw(0..surface.indices.len() as u32 * 3, 0..1);
             }

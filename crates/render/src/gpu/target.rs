@@ -21,8 +21,8 @@ pub(super) struct Target {
 /// What a picture is made in.
 #[derive(Debug)]
 pub(super) struct Images {
-    /// Colours and depths of all samples.
-    pub(super) samples: wgpu::TextureView,
+    /// Colours of all samples, where a pixel has more than one; and depths.
+    pub(super) samples: Option<wgpu::TextureView>,
     pub(super) depth: wgpu::TextureView,
     /// The colours of pixels; then the mean of several such pictures.
     pub(super) resolved: wgpu::TextureView,
@@ -88,7 +88,7 @@ impl Target {
     }
 
     fn new(context: &Context, place: Place, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
-        Self { place, size, drawn_size: size, format, images: Images::new(context, size, format) }
+        Self { place, size, drawn_size: size, format, images: Images::new(context, size, format, SAMPLES) }
     }
 
     /// Gives the target another size.
@@ -111,8 +111,20 @@ impl Target {
         let size = held(context, self.size.map(|s| (f64::from(s) * scale).round() as u32));
         if size != self.drawn_size {
             self.drawn_size = size;
-            self.images = Images::new(context, size, self.format);
+            self.images = Images::new(context, size, self.format, self.images.count());
         }
+    }
+
+    /// Draws pictures with so many samples a pixel.
+    pub(super) fn set_samples(&mut self, context: &Context, count: u32) {
+        if count != self.images.count() {
+            self.images = Images::new(context, self.drawn_size, self.format, count);
+        }
+    }
+
+    /// Whether pictures are made with as many pixels as the target has.
+    pub(super) fn is_whole(&self) -> bool {
+        self.drawn_size == self.size
     }
 
     /// The next picture; `None` if the target is not available now.
@@ -239,21 +251,26 @@ fn picture(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> wg
 }
 
 impl Images {
-    fn new(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
+    fn new(context: &Context, size: [u32; 2], format: wgpu::TextureFormat, count: u32) -> Self {
         use wgpu::TextureUsages as Usage;
         let bound = Usage::RENDER_ATTACHMENT | Usage::TEXTURE_BINDING;
         let view = |label, format, samples, usage| image(context, label, size, format, samples, usage);
         Self {
-            samples: view("samples", format, SAMPLES, Usage::RENDER_ATTACHMENT),
-            depth: view("depth", DEPTH, SAMPLES, bound),
+            samples: (count > 1).then(|| view("samples", format, count, Usage::RENDER_ATTACHMENT)),
+            depth: view("depth", DEPTH, count, bound),
             resolved: view("resolved", format, 1, bound),
             mean: view("mean", MEAN, 1, bound),
         }
     }
 
+    /// Samples a pixel.
+    fn count(&self) -> u32 {
+        self.depth.texture().sample_count()
+    }
+
     /// Bytes of memory on the GPU.
     pub(super) fn bytes(&self) -> u64 {
-        [&self.samples, &self.depth, &self.resolved, &self.mean].map(image_bytes).iter().sum()
+        [&self.depth, &self.resolved, &self.mean].into_iter().chain(&self.samples).map(image_bytes).sum()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::draw::BoxLines;
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::{Common, Output, PipelineSpec, group, group_layout};
+use crate::gpu::pipeline::{Common, Output, Pipeline, group, group_layout};
 use crate::gpu::types::Line;
 use crate::gpu::{Context, GpuError};
 use tetralod::geom::{Bounds, SinglePoints};
@@ -13,11 +13,12 @@ const HANDLE: f32 = 17.0;
 
 #[derive(Debug)]
 pub(super) struct WirePass {
-    hidden: wgpu::RenderPipeline,
-    seen: wgpu::RenderPipeline,
-    /// With the group of bindings before that of the lists, which is empty.
-    listed: Option<(wgpu::RenderPipeline, wgpu::BindGroup)>,
-    dots: wgpu::RenderPipeline,
+    hidden: Pipeline,
+    seen: Pipeline,
+    listed: Pipeline,
+    dots: Pipeline,
+    /// The group of bindings before that of the lists.
+    nothing: wgpu::BindGroup,
     lines: GrowBuffer<Line>,
     handles: GrowBuffer<Line>,
 }
@@ -30,37 +31,22 @@ const BUFFERS: [Option<wgpu::VertexBufferLayout<'_>>; 1] = [Some(wgpu::VertexBuf
 })];
 
 impl WirePass {
-    pub(super) fn new(context: &Context, common: &Common) -> Self {
+    pub(super) fn new(context: &Context, lists: &wgpu::BindGroupLayout) -> Self {
         let pipeline = |vertex, fragment, depth| {
-            let output = Output::Over(depth);
-            let spec = PipelineSpec::new("wire", [vertex, fragment], &[], output);
-            PipelineSpec { buffers: &BUFFERS, ..spec }.create(context, common)
+            Pipeline::new("wire", [vertex, fragment], &[], Output::Over(depth)).with_buffers(&BUFFERS)
         };
+        let nothing = group_layout(context, "nothing", &[]);
+        let listed = Output::List { only_front: false };
+        let listed = Pipeline::new("wire", ["vs_line", "fs_list"], &[&nothing, lists], listed);
         Self {
             hidden: pipeline("vs_line", "fs_hidden", wgpu::CompareFunction::Greater),
             seen: pipeline("vs_line", "fs_line", wgpu::CompareFunction::LessEqual),
-            listed: None,
+            listed: listed.with_buffers(&BUFFERS),
             dots: pipeline("vs_handle", "fs_handle", wgpu::CompareFunction::Always),
+            nothing: group(context, &nothing, &[]),
             lines: GrowBuffer::new("lines", wgpu::BufferUsages::VERTEX),
             handles: GrowBuffer::new("handles", wgpu::BufferUsages::VERTEX),
         }
-    }
-
-    /// Makes what lines among other things that are not opaque take, once.
-    pub(super) fn prepare_lists(
-        &mut self,
-        context: &Context,
-        common: &Common,
-        lists: &wgpu::BindGroupLayout,
-    ) {
-        if self.listed.is_some() {
-            return;
-        }
-        let nothing = group_layout(context, "nothing", &[]);
-        let (groups, output) = ([Some(&nothing), Some(lists)], Output::List { only_front: false });
-        let spec = PipelineSpec::new("wire", ["vs_line", "fs_list"], &groups, output);
-        let pipeline = PipelineSpec { buffers: &BUFFERS, ..spec }.create(context, common);
-        self.listed = Some((pipeline, group(context, &nothing, &[])));
     }
 
     pub(super) fn update(
@@ -82,26 +68,29 @@ impl WirePass {
     }
 
     /// Lists the lines among what is not opaque.
-    pub(super) fn list(&self, pass: &mut wgpu::RenderPass<'_>) {
-        if let Some((pipeline, nothing)) = &self.listed {
-            pass.set_bind_group(1, nothing, &[]);
-            draw(pass, pipeline, &self.lines);
-        }
+    pub(super) fn list(&self, with: (&Context, &Common), pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_bind_group(1, &self.nothing, &[]);
+        draw(with, pass, &self.listed, &self.lines);
     }
 
     /// Draws over everything else: lines, unless they have been listed, what of them is hidden, and handles.
-    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, are_listed: bool) {
-        draw(pass, &self.hidden, &self.lines);
+    pub(super) fn draw(&self, with: (&Context, &Common), pass: &mut wgpu::RenderPass<'_>, are_listed: bool) {
+        draw(with, pass, &self.hidden, &self.lines);
         if !are_listed {
-            draw(pass, &self.seen, &self.lines);
+            draw(with, pass, &self.seen, &self.lines);
         }
-        draw(pass, &self.dots, &self.handles);
+        draw(with, pass, &self.dots, &self.handles);
     }
 }
 
-fn draw(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, items: &GrowBuffer<Line>) {
+fn draw(
+    (context, common): (&Context, &Common),
+    pass: &mut wgpu::RenderPass<'_>,
+    pipeline: &Pipeline,
+    items: &GrowBuffer<Line>,
+) {
     if let Some(slice) = items.slice() {
-        pass.set_pipeline(pipeline);
+        pass.set_pipeline(pipeline.get(context, common, None));
         pass.set_vertex_buffer(0, slice);
         pass.draw(0..6, 0..items.len() as u32);
     }

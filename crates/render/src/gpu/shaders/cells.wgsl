@@ -80,7 +80,7 @@ fn seen(in: Vertex) -> Seen {
 @fragment
 fn fs(in: Vertex) -> @location(0) vec4f {
     let what = seen(in);
-    if is_clipped(in.position, style.clips.x) {
+    if HAS_CLIPS && is_clipped(in.position, style.clips.x) {
         discard;
     }
     return vec4f(shaded(what).rgb, 1.0);
@@ -117,11 +117,11 @@ fn vs_edge(@builtin(vertex_index) i: u32) -> EdgePoint {
 
 @fragment
 fn fs_edge(in: EdgePoint) -> @location(0) vec4f {
-    if is_clipped(in.position, style.clips.x) {
+    if HAS_CLIPS && is_clipped(in.position, style.clips.x) {
         discard;
     }
     var colour = style.edge.rgb;
-    if style.back.w > 0.0 {
+    if HAS_VALUES {
         colour = encode(mapped(in.value));
     }
     return vec4f(colour, 1.0);
@@ -149,11 +149,11 @@ fn vs_point(@builtin(vertex_index) i: u32, @builtin(instance_index) number: u32)
 @fragment
 fn fs_point(in: Point) -> @location(0) vec4f {
     let across = dot(in.offset, in.offset);
-    if across > 1.0 || is_clipped(in.position, style.clips.x) {
+    if across > 1.0 || (HAS_CLIPS && is_clipped(in.position, style.clips.x)) {
         discard;
     }
     var albedo = style.front.rgb;
-    if style.back.w > 0.0 {
+    if HAS_VALUES {
         albedo = mapped(in.value);
     }
     return vec4f(encode(albedo * (0.45 + 0.75 * sqrt(1.0 - across))), 1.0);

@@ -1,9 +1,15 @@
 // How surfaces look: their colours, and how light falls on them. Colours are linear until `encode`. Twin:
 // `Style` in `gpu/style.rs`.
 
+// What the style takes: 0 for smooth, 1 for flat, 2 for no light; whether values give colours, whether there are edges, and
+// clip planes. Twin: `Variant` in `gpu/pipeline.rs`.
+override LIGHT: u32;
+override HAS_VALUES: bool;
+override HAS_EDGES: bool;
+override HAS_CLIPS: bool;
+
 struct Style {
-    // The sides that are seen from lower and from higher values: linear; in w opacity, and whether values give
-    // colours.
+    // The sides that are seen from lower and from higher values: linear; in w of the first opacity.
     front: vec4f,
     back: vec4f,
     // Of values: the smallest (or its logarithm), one over the range of them, whether it is logarithmic; if
@@ -11,8 +17,8 @@ struct Style {
     scale: vec4f,
     // Of edges: sRGB and strength.
     edge: vec4f,
-    // Width of edges in units of the page's layout, 0 for none; in y 0 for smooth, 1 for flat, 2 for no
-    // light; how much tetrahedra are shrunk; diameter of points in units of the page's layout.
+    // In units of the page's layout, the width of edges (y unused); how much tetrahedra are shrunk; diameter of points in
+    // units of the page's layout.
     shape: vec4f,
     // The clip planes that apply, a bit each; whether each tetrahedron has a value (z, w unused).
     clips: vec4u,
@@ -102,9 +108,6 @@ fn lit(albedo: vec3f, n: vec3f, view: vec3f) -> vec3f {
 // How much of the edge colour there is at a place in a triangle. Edges fade out where they are a few pixels long:
 // both triangles at an edge agree about that. One that is thinner than its lines draws none.
 fn edge_strength(seen: Seen) -> f32 {
-    if style.shape.x <= 0.0 {
-        return 0.0;
-    }
     let right = seen.sides_right;
     let down = seen.sides_down;
     let slope = max(sqrt(right * right + down * down), vec3f(1e-9));
@@ -127,20 +130,23 @@ fn edge_strength(seen: Seen) -> f32 {
 // sRGB and opacity.
 fn shaded(seen: Seen) -> vec4f {
     var albedo = select(style.back.rgb, style.front.rgb, seen.is_front);
-    if style.back.w > 0.0 {
+    if HAS_VALUES {
         albedo = mapped(seen.value);
     }
     var colour = albedo;
-    if style.shape.y == 0.0 {
+    if LIGHT == 0u {
         let smooth_normal = normalize(seen.normal);
         let n = select(-smooth_normal, smooth_normal, seen.is_front);
         colour = lit(albedo, n, towards_eye(seen.position));
-    } else if style.shape.y == 1.0 {
+    } else if LIGHT == 1u {
         // Mostly flat, so that the colours stay those of the legend.
         let n = normalize(select(-seen.face, seen.face, seen.is_front));
         colour = albedo * (vec3f(0.62) + 0.55 * diffuse(n));
     }
+    let own = encode(colour);
+    if !HAS_EDGES {
+        return vec4f(own, style.front.w);
+    }
     let edge = edge_strength(seen);
-    let mixed = mix(encode(colour), style.edge.rgb, edge);
-    return vec4f(mixed, mix(style.front.w, 1.0, edge * step(0.001, style.front.w)));
+    return vec4f(mix(own, style.edge.rgb, edge), mix(style.front.w, 1.0, edge * step(0.001, style.front.w)));
 }

@@ -36,11 +36,11 @@ fn vs(@builtin(vertex_index) i: u32) -> Vertex {
     let is_corner = vec3f(f32(i % 3u == 0u), f32(i % 3u == 1u), f32(i % 3u == 2u));
     let inner = (packed.yzx & vec3u(IS_INNER)) != vec3u(0u);
     var normal = vec3f(0.0);
-    if style.shape.y == 0.0 {
+    if LIGHT == 0u {
         normal = vec3f(normals[3u * v], normals[3u * v + 1u], normals[3u * v + 2u]);
     }
     var value = 0.0;
-    if style.back.w > 0.0 {
+    if HAS_VALUES {
         value = values[v];
     }
     let position = p[i % 3u];
@@ -61,7 +61,7 @@ fn seen(in: Vertex, is_front: bool) -> Seen {
 @fragment
 fn fs(in: Vertex, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let what = seen(in, is_front);
-    if is_clipped(in.position, style.clips.x) {
+    if HAS_CLIPS && is_clipped(in.position, style.clips.x) {
         discard;
     }
     return vec4f(shaded(what).rgb, 1.0);
@@ -70,7 +70,7 @@ fn fs(in: Vertex, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
 @fragment
 fn fs_list(in: Vertex, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let colour = shaded(seen(in, is_front));
-    if !is_clipped(in.position, style.clips.x) {
+    if !HAS_CLIPS || !is_clipped(in.position, style.clips.x) {
         append_colour(in.clip, in.position, vec4f(colour.rgb * colour.a, colour.a), 0.0);
     }
     return vec4f(0.0);
