@@ -46,9 +46,9 @@ export class MeshWork {
     [this.#viewer, this.#emit, this.#changed] = [viewer, emit, changed];
   }
 
-  /** Another volume has taken the place of the one before. */
-  forget() {
-    [this.#request, this.#before, this.#isRequested] = [FIRST, FIRST, false];
+  /** Another volume has taken the place of the one before; `request` is the first for it. */
+  forget(request = FIRST) {
+    [this.#request, this.#before, this.#isRequested] = [request, FIRST, false];
     [this.bytes, this.ready, this.held] = [0, false, undefined];
     this.#last = { end: -Infinity, took: 0 };
   }

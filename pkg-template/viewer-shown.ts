@@ -3,6 +3,7 @@
 import { flattenError, known, type FlatError } from "./errors.js";
 import { changedScene, checkFields, fitScene } from "./fit.js";
 import type { SceneChange } from "./latest.js";
+import type { Unchecked } from "./options.js";
 import type { MtInfo } from "./results.js";
 import type { CameraState, Misfit, SceneState, ViewerChanges } from "./scene.js";
 import type { Viewer } from "./tetralod_viewer.js";
@@ -11,6 +12,8 @@ import type { Viewer } from "./tetralod_viewer.js";
 export interface Wanted {
   scene: SceneState;
   camera?: CameraState | null;
+  /** The first request, if it is known before the volume. */
+  request?: Unchecked | undefined;
 }
 
 /** What is told of a volume that has been opened. */

@@ -47,7 +47,7 @@ const device = () => ({ adapter: on().viewer.adapter(), isSoftware: on().viewer.
 function forget(wanted: Wanted) {
   const { shown, mesh, frames } = on();
   shown.forget(wanted);
-  mesh.forget();
+  mesh.forget(wanted.request);
   frames.forget();
   frames.invalidate();
 }
@@ -117,9 +117,9 @@ const methods = {
     return device();
   },
 
-  clear(fields: readonly string[], state: ViewerChanges) {
+  async clear(fields: readonly string[], state: ViewerChanges, request?: Unchecked) {
     const { viewer, shown } = on();
-    const wanted = shown.first(state);
+    const wanted = { ...shown.first(state), request: request && (await received(request)) };
     methods.halt();
     viewer.clear([...fields]);
     forget(wanted);
@@ -148,10 +148,10 @@ const methods = {
   /** Opens a file in parts; resolves to nothing where the server gives no ranges, and otherwise when it has been drawn. */
   async openParts(
     url: string,
-    { fields, memory, state, ...options }: RangesOptions & { fields: readonly string[]; memory: number; state: ViewerChanges },
+    { fields, memory, state, request, ...options }: RangesOptions & { fields: readonly string[]; memory: number; state: ViewerChanges; request?: Unchecked | undefined },
   ): Promise<Opened | undefined> {
     const { viewer, shown, mesh, frames } = on();
-    const wanted = shown.first(state);
+    const wanted = { ...shown.first(state), request: request && (await received(request)) };
     methods.halt();
     const onError = (error: TetralodError) => {
       if (mesh.ready && !viewer.isOpening) emit("error", flattenError(error));
@@ -165,6 +165,8 @@ const methods = {
       return undefined;
     }
     mesh.ready = true;
+    // What a request needs is fetched while the first picture is drawn.
+    if (request) mesh.follow();
     invalidate();
     await frames.drawn();
     frames.reportCamera();

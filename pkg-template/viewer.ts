@@ -122,6 +122,8 @@ export interface ViewerOpenOptions extends ReadOptions {
   signal?: AbortSignal | undefined;
   /** What is drawn from the first picture on: changes as for `set`, of which all that fits the volume is used. */
   state?: ViewerChanges;
+  /** The first request, as for `refine`: what it needs is fetched as soon as the base mesh has arrived. A later one replaces it. */
+  request?: ViewerRefineOptions | undefined;
 }
 
 /** A volume that has been opened. */
@@ -465,9 +467,10 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
    * @throws {TetralodError} when the source cannot be read or is not an MT file; what was open stays, unless it came as a stream
    */
   async open(source: Source, options: ViewerOpenOptions = {}): Promise<OpenedVolume> {
-    const { signal, state, ...how } = options;
+    const { signal, state, request, ...how } = options;
     signal?.throwIfAborted();
-    const fetching = { ...openOptions(how, ["signal", "state"]), state: sendable(state ?? {}, true) as ViewerChanges };
+    const first = request && sendable(request, true);
+    const fetching = { ...openOptions(how, ["signal", "state", "request"]), state: sendable(state ?? {}, true) as ViewerChanges, request: first };
     this.#stream?.abort(new DOMException("another volume was opened", "AbortError"));
     const control = new AbortController();
     this.#stream = control;
@@ -476,7 +479,7 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
     const inParts = ranges && (await this.#openParts(fetching, ranges, stopped));
     if (inParts) return inParts;
     const opened = await openSource(source, stopped, fetching);
-    await this.#remote.call("clear", [fetching.fields, fetching.state]);
+    await this.#remote.call("clear", [fetching.fields, fetching.state, first]);
     stopped.throwIfAborted();
     this.#info = undefined;
     const { promise: ready, resolve, reject } = deferred<Pick<OpenedVolume, "info" | "dropped">>();
@@ -493,7 +496,7 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   }
 
   async #openParts(
-    { whole: _, ...fetching }: Fetching & { state: ViewerChanges },
+    { whole: _, ...fetching }: Fetching & { state: ViewerChanges; request?: Unchecked | undefined },
     { url, ...along }: RangesSource,
     signal: AbortSignal,
   ): Promise<OpenedVolume | undefined> {
@@ -503,6 +506,7 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
     if (!opened?.info) return undefined;
     const { info, scene = {}, dropped = [], progress } = opened;
     [this.#info, this.#scene] = [info, scene];
+    if (fetching.request) resolve();
     const unasked = setTimeout(() => this.#remote.call("follow", []).then(resolve, () => {}), UNASKED);
     this.#requested = () => {
       clearTimeout(unasked);

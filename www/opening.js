@@ -8,6 +8,7 @@ import { nameOf } from "./format.js";
 import { fail, hideMessage, note } from "./messages.js";
 import { showGrowth } from "./numbers.js";
 import { demo, viewer } from "./page.js";
+import { afterFirst, firstRequest, stopHolding } from "./request.js";
 import { fileNameIn, isNew, setOrigin, source, sourceOf } from "./source.js";
 import { carriedOver, store } from "./state.js";
 
@@ -53,6 +54,7 @@ export async function open(wanted, words) {
   source.open = source.tried = from;
   showInList(from);
   const mine = ++opening;
+  stopHolding();
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined, request: undefined, blocks: undefined });
   Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
   store.change({ playing: false, freeze: false, kept: false });
@@ -62,12 +64,17 @@ export async function open(wanted, words) {
   $("progress").removeAttribute("value");
   $("growth").textContent = `Opening ${nameOf(from)}…`;
   try {
-    const { info, total, finished } = await viewer().open(from);
+    const request = firstRequest(shown);
+    const { info, total, finished } = await viewer().open(from, { request });
     if (mine !== opening) return;
     demo.totalBytes = total;
     if (demo.state === "opening") demo.state = "streaming";
+    // A file in blocks is fetched as it is asked for; of others everything comes.
+    const whole = request && demo.blocks ? afterFirst(finished, () => mine === opening) : undefined;
+    whole?.catch(() => {});
     arrive(info, shown);
     await finished;
+    await whole;
     if (mine !== opening) return;
     demo.state = "complete";
     demo.totalBytes ??= demo.receivedBytes;

@@ -6,7 +6,7 @@ import { count, percentage, pixels } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, viewer } from "./page.js";
 import { region } from "./region.js";
-import { store } from "./state.js";
+import { FIRST, store } from "./state.js";
 
 /** What the request is made of. */
 const ASKED = /** @type {const} */ ([
@@ -17,11 +17,44 @@ const ASKED = /** @type {const} */ ([
 /** Which place the slider of errors shows. */
 const place = () => (store.state.refine === "view" ? "outside" : "error");
 
-/** 0 at the left end, then from 0.01 % to 100 % in equal ratios. */
-function errorPercent() {
-  const at = store.state[place()];
-  return at === 0 ? 0 : 10 ** (-2 + (4 * at) / 100);
+/** 0 at the left end, then from 0.01 % to 100 % in equal ratios. @param {number} at */
+const percentAt = (at) => (at === 0 ? 0 : 10 ** (-2 + (4 * at) / 100));
+const errorPercent = () => percentAt(store.state[place()]);
+
+/** With these words less may be asked for than an error everywhere. */
+const SHAPING = ["refine", "budget", "focus", "region", "field", "time"];
+/** A mesh within this error (in %) shows what a volume is, and is there much sooner than a fine one. */
+const COARSE = 5;
+
+/** What is asked for with the opening of a volume that these words are of; nothing where it might be too much. @param {import("./state.js").Words} words */
+export function firstRequest({ error = "", ...words }) {
+  if (SHAPING.some((name) => words[name])) return undefined;
+  const percent = percentAt(error === "" ? FIRST.error : Number(error));
+  return { error: /** @type {const} */ (`${percent >= COARSE ? percent : COARSE}%`) };
 }
+
+/** How long others wait for the first mesh (in ms). */
+const PATIENCE = 1000;
+let isHeld = false;
+
+/**
+ * Makes no request before the first mesh is there, or has taken too long; resolves when the mesh is what is asked for then.
+ *
+ * @param {Promise<unknown>} first
+ * @param {() => boolean} isCurrent whether no other volume has been opened
+ */
+export async function afterFirst(first, isCurrent) {
+  isHeld = true;
+  // Whoever waits for it hears of an error.
+  await Promise.race([first.catch(() => {}), new Promise((resolve) => setTimeout(resolve, PATIENCE))]);
+  if (!isCurrent()) return;
+  isHeld = false;
+  refine();
+  await viewer().settled();
+}
+
+/** Another volume is opened. */
+export const stopHolding = () => void (isHeld = false);
 
 /** From a quarter of a pixel to 64 pixels in equal ratios. */
 export const errorPixels = () => Number((0.25 * 256 ** (store.state.pixels / 100)).toPrecision(2));
@@ -51,7 +84,7 @@ export const refined = () => coming;
 
 /** Requests the mesh that the settings ask for, if that is another one. */
 function refine() {
-  if (!demo.info) return;
+  if (!demo.info || isHeld) return;
   const wanted = options();
   if (JSON.stringify(wanted) === JSON.stringify(demo.request)) return;
   demo.request = wanted;

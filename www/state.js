@@ -300,7 +300,7 @@ const ENTRIES = {
 };
 
 /** What there is first of what no volume changes. @type {Omit<Others, "field" | "box">} */
-const FIRST = {
+export const FIRST = {
   view: /** @type {Mode} */ (loadedChoice("mode")),
   also: [],
   opacities: Object.fromEntries(SHEER.map((name) => [name, OPAQUE])),

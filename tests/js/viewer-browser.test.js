@@ -18,10 +18,18 @@ let server;
 /** Paths that were asked for. */
 let asked = [];
 
+/** Answers with a part of the file. */
+function endPart(range, response) {
+  const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(range).map(Number);
+  const part = file.subarray(first, last + 1);
+  response.writeHead(206, { etag: '"1"', "content-range": `bytes ${first}-${first + part.length - 1}/${file.length}` }).end(part);
+}
+
 before(async () => {
-  server = await servePackage(({ url }, response) => {
+  server = await servePackage(({ url, headers }, response) => {
     asked.push(url);
     if (url === "/model.mt") response.end(file);
+    else if (url === "/parts.mt") endPart(headers.range, response);
     else if (url === "/fields.mt") response.end(fields);
     else if (url === "/nothing.mt") response.writeHead(404).end();
     else response.setHeader("content-type", "text/html").end(PAGE);
@@ -211,6 +219,40 @@ test("after `open` alone the mesh becomes the one that the picture needs", async
   });
   assert.ok(seen.tetrahedra > 1000, JSON.stringify(seen));
   assert.deepEqual([seen.parts, seen.whole], [seen.tetrahedra, seen.tetrahedra]);
+  await page.close();
+});
+
+test("a request that comes with `open` is the first one, and a later one replaces it", async () => {
+  const page = await opened();
+  await page.evaluate(CODES);
+  const seen = await page.evaluate(async () => {
+    const {
+      codeOf,
+      tetralodDemo: { viewer },
+    } = /** @type {any} */ (window);
+    const settled = async () => {
+      await viewer.settled();
+      return (await viewer.mesh()).tets.length / 4;
+    };
+    const counts = [];
+    for (const file of ["/model.mt", "/parts.mt"]) {
+      const { finished } = await viewer.open(file, { request: { error: "10%" } });
+      await finished;
+      const first = await settled();
+      await viewer.refine({ error: "10%" });
+      const asked = await settled();
+      await viewer.open(file, { request: { error: "10%" } });
+      await viewer.refine({ error: 0 });
+      counts.push({ first, asked, later: await settled() });
+    }
+    return { counts, wrong: await codeOf(viewer.open("/model.mt", { request: { where: () => true } })) };
+  });
+  const full = await page.evaluate(() => window.tetralodDemo.full.tetrahedra);
+  for (const { first, asked, later } of seen.counts) {
+    assert.ok(first < full / 2, JSON.stringify(seen));
+    assert.deepEqual([first, later], [asked, full]);
+  }
+  assert.equal(seen.wrong, "bad-option");
   await page.close();
 });
 

@@ -41,6 +41,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
     fields: ["p"],
     signal,
     state: { ...first, boundary: null },
+    request: { error: "5%" },
   });
   dropped.map(({ part, problem }: Misfit) => `${part}: ${problem}`) satisfies string[];
   await viewer.refine({ error: "1%" }, { signal });
