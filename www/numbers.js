@@ -36,7 +36,7 @@ export function showGrowth() {
   const origin = originOf();
   const before = origin ? `${size(origin.bytes)} as ${origin.format}` : `${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU`;
   const words = `${count(tetrahedra)} tetrahedra: ${before}${whole}, `;
-  const software = viewer().isSoftware ? [element("small", {}, "No GPU: drawn in software, coarser while something moves")] : [];
+  const software = viewer().isSoftware ? [element("small", {}, "No GPU: drawn in software", element("span", {}, ", coarser while something moves"))] : [];
   $("growth").replaceChildren(words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched", ...software);
 }
 
