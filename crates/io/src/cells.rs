@@ -5,6 +5,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::mem::take;
 use std::ops::Range;
 
 use crate::MemoryLimit;
@@ -260,13 +261,10 @@ impl Indices<'_> {
         self.part(0..usize::MAX)
     }
 
-    pub fn to_mut(&mut self) -> &mut Vec<i64> {
-        if let Self::Stored { .. } = self {
-            *self = Self::Listed(self.all().into_owned());
-        }
+    pub fn into_list(self) -> Vec<i64> {
         match self {
             Self::Listed(list) => list,
-            Self::Stored { .. } => unreachable!("just replaced"),
+            stored => stored.all().into_owned(),
         }
     }
 }
@@ -375,13 +373,13 @@ impl CellList<'_> {
     /// Puts the points of these cells, hexahedra of the second order, into the order that VTK has had since version 9: two edges come in
     /// another one.
     pub fn order_as_before_9(&mut self, cells: Vec<bool>) {
-        let mut start = 0;
         if !cells.contains(&true) {
             return;
         }
+        let (mut start, mut listed) = (0, take(&mut self.connectivity).into_list());
         for (swapped, end) in cells.into_iter().zip(&self.ends) {
             let end = end_of(end);
-            if let Some(points @ [_, .., _]) = self.connectivity.to_mut().get_mut(start..end)
+            if let Some(points @ [_, .., _]) = listed.get_mut(start..end)
                 && swapped
                 && points.len() == 27
             {
@@ -389,6 +387,7 @@ impl CellList<'_> {
             }
             start = end;
         }
+        self.connectivity = Indices::Listed(listed);
     }
 
     /// Leaves out the cells with a point that is hidden.

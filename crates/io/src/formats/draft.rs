@@ -1,8 +1,9 @@
 //! A mesh as the files of meshers list it, before its cells are split.
 
 use std::collections::BTreeMap;
+use std::mem::take;
 
-use crate::cells::{self, CellList, Numbering};
+use crate::cells::{self, CellList, Indices, Numbering};
 use crate::error::{ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::number::points_from;
@@ -57,9 +58,10 @@ impl<'a> Draft<'a> {
     /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has.
     pub fn add_cell(&mut self, kind: i64, points: impl IntoIterator<Item = i64>) {
         self.list.types.push(kind);
-        let listed = self.list.connectivity.to_mut();
+        let mut listed = take(&mut self.list.connectivity).into_list();
         listed.extend(points);
         self.list.ends.push(listed.len() as i64);
+        self.list.connectivity = Indices::Listed(listed);
     }
 
     /// Keeps an array with values at points, which are read only if they are wanted.
