@@ -319,9 +319,12 @@ fn octaves_between(a: ErrorCode, b: ErrorCode) -> f64 {
 impl FieldAtom {
     #[inline]
     fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4]) -> Verdict {
-        let exceeds = tet.error > self.tolerance;
-        let mut conditions = Conditions::new();
-        conditions.add(exceeds, octaves_between(tet.error, self.tolerance), TOLERANCE);
+        let of_error = octaves_between(tet.error, self.tolerance);
+        if tet.error <= self.tolerance {
+            // Wherever it lies: the tolerance seldom moves, and what is asked for at other places changes nothing.
+            return Verdict { excess: 0.0, slack: of_error, component: TOLERANCE };
+        }
+        let mut conditions = Conditions::new(of_error);
         if let Some(range) = &self.values {
             let inside = range.inside(&(tet.levels)(range.field), tet.error_of(range.error_of).error());
             conditions.add(inside >= 0.0, inside.abs() / range.levels, ANY);
@@ -381,8 +384,9 @@ struct Conditions {
 }
 
 impl Conditions {
-    fn new() -> Self {
-        Self { all: true, held: f64::INFINITY, missing: 0.0, component: ANY }
+    /// With one that holds.
+    fn new(slack: f64) -> Self {
+        Self { all: true, held: slack, missing: 0.0, component: ANY }
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Convex regions as functions: how far a tetrahedron is outside, or how deep inside.
 
-use super::tet_minimax::Rows;
+use super::tet_minimax::{Rows, smallest};
 use super::{MAX_PLANES, Region};
 use crate::geom::nearest_on_triangle;
 use crate::mesh::FACES;
@@ -98,23 +98,23 @@ impl Shape {
     pub fn least(&self, corners: &[DVec3; 4], threshold: f64) -> (f64, Option<usize>) {
         match self {
             Self::Planes(planes) => {
-                let mut rows = Rows::new();
                 let mut furthest = (f64::NEG_INFINITY, 0);
                 for (k, plane) in planes.iter().enumerate() {
-                    let values = plane.distances(corners);
                     // One plane with all corners beyond it is enough; the one that is furthest lasts longest.
-                    let nearest = values.iter().fold(f64::INFINITY, |m, &v| m.min(v));
+                    let nearest = smallest(&plane.distances(corners));
                     if nearest > furthest.0 {
                         furthest = (nearest, k);
-                    }
-                    // A side at infinity bounds nothing.
-                    if nearest > f64::NEG_INFINITY {
-                        rows.push(values);
                     }
                 }
                 if furthest.0 > threshold {
                     return (furthest.0, Some(furthest.1));
                 }
+                let mut rows = Rows::new();
+                // A side at infinity bounds nothing.
+                let bounding = planes.iter().map(|plane| plane.distances(corners));
+                bounding
+                    .filter(|values| smallest(values) > f64::NEG_INFINITY)
+                    .for_each(|values| rows.push(values));
                 (rows.least(threshold), None)
             }
             Self::Ball { centre, radius } => {
