@@ -124,7 +124,7 @@ export interface CoreBuildOptions {
   purpose?: "uniform" | "regions";
   /** Whether tetrahedra have errors of their own, with method insert. */
   tetErrors?: boolean;
-  /** Names of the fields to keep, in this order; a vector's name for its components. Default: the first field. */
+  /** Names of the fields to keep, in this order; a vector's name for its components. Default: the first that does not number something or say where it is, by its name. */
   fields?: readonly string[];
   /** Whether to keep all fields but the lengths of vectors. */
   allFields?: boolean;

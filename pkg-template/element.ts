@@ -48,12 +48,13 @@ export interface TetralodViewerElement {
   /** The address of the volume. */
   get src(): string | null;
   set src(url: string | URL | null);
+  /** What is drawn. Default: the isosurface where there is an `isovalue` or the volume fills its box, else the boundary. */
   get mode(): ViewerMode | null;
   set mode(mode: ViewerMode | null);
-  /** One value, or several with spaces between them, in units of the field. Default: the middle of its range. */
+  /** One value, or several with spaces between them, in units of the field. Default: that of its `FieldInfo`. */
   get isovalue(): string | null;
   set isovalue(values: string | number | readonly number[] | null);
-  /** The name of the field that is shown. Default: the first. */
+  /** The name of the field that is shown. Default: `firstField` of the volume. */
   get field(): string | null;
   set field(name: string | null);
   /**
@@ -107,6 +108,8 @@ const MODES: Record<ViewerMode, (about: { values: number[]; middle: number | und
   cells: () => ({ cells: {} }),
 };
 const NOTHING: ViewerChanges = { isosurfaces: [], volume: null, slices: null, boundary: null, cells: null };
+/** No part is named: the viewer draws what is first. */
+const UNNAMED: ViewerChanges = { ...NOTHING, isosurfaces: null };
 
 /** What a viewer tells goes on from the element. */
 const EVENTS = ["progress", "stats", "frame", "camera", "legend", "overlay", "restored"];
@@ -320,19 +323,20 @@ export class TetralodViewerElement extends Base {
     return values;
   }
 
-  get #mode(): ViewerMode {
-    const mode = this.getAttribute("mode") || "isosurface";
-    if (Object.hasOwn(MODES, mode)) return mode as ViewerMode;
+  /** Without one, and without an isovalue, the first picture of the volume. */
+  get #mode(): ViewerMode | "" {
+    const mode = this.getAttribute("mode") || (this.getAttribute("isovalue") ? "isosurface" : "");
+    if (!mode || Object.hasOwn(MODES, mode)) return mode as ViewerMode | "";
     throw refused("mode", `must be one of ${Object.keys(MODES).join(", ")}, is ${mode}`);
   }
 
   /** What is drawn. */
   #scene(info?: MtInfo): ViewerChanges {
     const [map, background] = ["map", "background"].map((name) => this.getAttribute(name));
+    const mode = this.#mode;
     const middle = info && (info.bounds[2] + info.bounds[5]) / 2;
     return {
-      ...NOTHING,
-      ...MODES[this.#mode]({ values: this.#values, middle }),
+      ...(mode ? { ...NOTHING, ...MODES[mode]({ values: this.#values, middle }) } : UNNAMED),
       colours: map === null ? null : { map },
       background: background as SceneState["background"] | null,
       ...this.#state,

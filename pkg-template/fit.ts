@@ -8,8 +8,6 @@ import type { ArrowState, ViewerChanges, Misfit, PlaneState, SceneState, Streaml
 const LEAST = 1e-5;
 const MOST = 1e3;
 
-/** What is shown where nothing that fits is left. */
-const FIRST: SceneState = { isosurfaces: [{}] };
 const PARTS = ["volume", "boundary", "cells", "streamlines", "arrows"] as const;
 const LISTS = ["isosurfaces", "slices"] as const;
 const FLOWS = ["streamlines", "arrows"] as const;
@@ -19,9 +17,21 @@ type Field = Pick<FieldInfo, "name" | "min" | "max">;
 
 /** What is asked of a volume. */
 export interface Volume {
+  isBox: boolean;
   fields: Field[];
   bounds: number[];
 }
+
+/** Whether a scene, or changes of one, say anything of what is drawn. */
+export const namesParts = (scene: ViewerChanges | Record<string, unknown>) =>
+  [...PARTS, ...LISTS].some((part) => (scene as Record<string, unknown>)[part] !== undefined);
+
+/** A scene that says nothing of it. */
+export const withoutParts = (scene: SceneState): SceneState =>
+  Object.fromEntries(Object.entries(scene).filter(([name]) => !namesParts({ [name]: true })));
+
+/** What is drawn of a volume where nothing is asked for: its boundary, or the isosurface of one whose boundary is a box. */
+const firstOf = ({ isBox }: Volume): SceneState => (isBox ? { isosurfaces: [{}] } : { boundary: {} });
 
 /** `scene` with some parts replaced; `null` gives a part its default. */
 export function changedScene<S extends SceneState>(scene: S, changes: ViewerChanges | Record<string, unknown>): S {
@@ -56,10 +66,11 @@ type Judge = (value: any) => string | undefined;
 
 /**
  * What of a scene fits a volume: fields that it has, values that one of its fields has, planes, boxes and points that meet its box,
- * lengths of its order. Where nothing is left that shows anything, it is the isosurface in the middle. The scene is one that wasm has
- * taken.
+ * lengths of its order. Where no part is named, or nothing is left that shows anything, it is what is drawn first. The scene is one that
+ * wasm has taken.
  */
-export function fitScene(scene: SceneState, { fields, bounds }: Volume): { scene: SceneState; dropped: Misfit[] } {
+export function fitScene(scene: SceneState, volume: Volume): { scene: SceneState; dropped: Misfit[]; isFirst: boolean } {
+  const { fields, bounds } = volume;
   const dropped: Misfit[] = [];
   /** Whether it fits: without a problem; else that is told. */
   const keep = (part: string, problem: string | undefined) => {
@@ -121,5 +132,6 @@ export function fitScene(scene: SceneState, { fields, bounds }: Volume): { scene
   }
   for (const part of FLOWS) if (fitted[part] === undefined) delete fitted[part];
   const isEmpty = PARTS.every((part) => !fitted[part]) && LISTS.every((list) => !fitted[list]?.length);
-  return { scene: isEmpty && dropped.length > 0 ? { ...fitted, ...FIRST } : fitted, dropped };
+  const isFirst = !namesParts(scene) || (isEmpty && dropped.length > 0);
+  return { scene: isFirst ? { ...fitted, ...firstOf(volume) } : fitted, dropped, isFirst };
 }

@@ -46,6 +46,11 @@ export interface FieldInfo {
    * if (histogram) console.log("most of the volume is near", min + ((most + 0.5) / histogram.length) * (max - min));
    */
   histogram: Float64Array | null;
+  /**
+   * The value whose isosurface is worth to be shown first, in field units, the same at all times: that which parts the histogram of the
+   * first time into two groups of values that differ most (Otsu 1979); the middle of the range where there is no histogram.
+   */
+  isovalue: number;
   /** What a mesh of some error takes. */
   curve: ErrorCurve;
 }
@@ -109,6 +114,16 @@ export interface MtInfo {
   /** The kind of Multi-Tessellation: what its updates are. */
   kind: "half-edge" | "edge" | "vertex";
   fields: FieldInfo[];
+  /**
+   * The number of the field that is shown where none is asked for: the first that varies, is no component of a vector, and, by its name,
+   * neither numbers something nor says where it is.
+   */
+  firstField: number;
+  /**
+   * Whether the domain is the box around it, but for a thousandth of its volume: as that of a grid. Then its boundary shows little, and
+   * an isosurface is drawn first.
+   */
+  isBox: boolean;
   /**
    * The box around the reference mesh, which holds every mesh of the volume: `[x0, y0, z0, x1, y1, z1]` in model units. Of files that were
    * made before they stated it, it may be larger by a 256th of the lattice at each side.

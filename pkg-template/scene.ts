@@ -10,7 +10,7 @@ export interface PlaneState {
 
 /** An isosurface. */
 export interface IsosurfaceState {
-  /** In field units; without it the middle of the field's range over all of its time steps. */
+  /** In field units; without it the `isovalue` of the field: see `FieldInfo`. */
   value?: number;
   /** 0 to 1; 1 without it. */
   opacity?: number;

@@ -1,7 +1,7 @@
 /** What a viewer draws, and of which volume. */
 
 import { flattenError, known, type FlatError } from "./errors.js";
-import { changedScene, checkFields, fitScene } from "./fit.js";
+import { changedScene, checkFields, fitScene, namesParts, withoutParts } from "./fit.js";
 import type { SceneChange } from "./latest.js";
 import type { Unchecked } from "./options.js";
 import type { MtInfo } from "./results.js";
@@ -27,6 +27,8 @@ export class Shown {
   #viewer: Viewer;
   /** What is drawn. */
   scene: SceneState = {};
+  /** Whether that is what is drawn where nothing is asked for: then it gives way to what is. */
+  #isFirst = false;
   /** The volume that it is drawn of, once its base mesh is there. */
   #volume: MtInfo | undefined;
   #wanted: Wanted | undefined;
@@ -39,7 +41,7 @@ export class Shown {
 
   /** What is to be drawn of a volume that is opened with this state; throws where that is wrong for any volume. */
   first({ camera, ...changes }: ViewerChanges): Wanted {
-    const scene = changedScene(this.scene, changes);
+    const scene = changedScene(this.#isFirst ? withoutParts(this.scene) : this.scene, changes);
     this.#viewer.setScene(scene);
     this.#viewer.setScene(this.scene);
     return { scene, camera };
@@ -57,7 +59,7 @@ export class Shown {
     this.#volume = { ...info, bounds: Array.from(this.#viewer.bounds()) };
     const { scene = this.scene, camera } = this.#wanted ?? {};
     this.#wanted = undefined;
-    ({ scene: this.scene, dropped: this.#dropped } = fitScene(scene, this.#volume));
+    ({ scene: this.scene, dropped: this.#dropped, isFirst: this.#isFirst } = fitScene(scene, this.#volume));
     this.#viewer.setScene(this.scene);
     try {
       if (camera) this.#viewer.setCamera(camera);
@@ -74,7 +76,8 @@ export class Shown {
   /** Makes a change of the scene or the camera, or nothing: then it gives what is wrong. */
   change({ changes, camera }: SceneChange): FlatError | undefined {
     try {
-      const scene = changedScene(this.scene, changes);
+      const isFirst = this.#isFirst && !namesParts(changes ?? {});
+      const scene = changedScene(this.#isFirst && !isFirst ? withoutParts(this.scene) : this.scene, changes);
       if (this.#volume) checkFields(scene, this.#volume);
       this.#viewer.setScene(scene);
       try {
@@ -83,7 +86,7 @@ export class Shown {
         this.#viewer.setScene(this.scene);
         throw error;
       }
-      this.scene = scene;
+      [this.scene, this.#isFirst] = [scene, isFirst];
       return undefined;
     } catch (error) {
       return flattenError(error);

@@ -227,9 +227,6 @@ const UNASKED = 100;
 /** Canvases that were handed over, which can be done once: who draws on them now. */
 const holders = new WeakMap<HTMLCanvasElement, Viewer | undefined>();
 
-/** What is drawn before something else is set: the isosurface in the middle of the field's range. */
-const SCENE: SceneState = { isosurfaces: [{}] };
-
 /** A caller that waits for a mesh, by the number of its request. */
 type Waiting = Deferred<ViewerStats> & { goal: number };
 
@@ -329,7 +326,6 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
     const offscreen = this.#handOver();
     const [width, height] = (this.#size = pixels(this.#canvas.getBoundingClientRect()));
     this.#device = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio, frameTime], [offscreen]);
-    await this.set(SCENE);
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);

@@ -114,8 +114,11 @@ class BuildDialog {
 
   /** @param {import("tetralod/build").InputInfo["fields"]} fields */
   #showFields(fields) {
-    const boxes = fields.map(({ name, at, unit }, i) => {
-      const box = element("input", { type: "checkbox", value: name, checked: i === 0 });
+    // Values at cells are changed on their way to the points: only where there are no others they are taken unasked.
+    const areAtPoints = fields.some(({ at }) => at === "points");
+    const boxes = fields.map(({ name, at, unit }) => {
+      const checked = (at === "points") === areAtPoints;
+      const box = element("input", { type: "checkbox", value: name, checked });
       box.dataset.at = at;
       const label = `${name}${unit && ` (${unit})`}${at === "cells" ? ", at cells" : ""}`;
       return element("label", {}, box, ` ${label}`);

@@ -2,7 +2,7 @@
 
 import { FIRST, pointsOf } from "./curve.js";
 import { $ } from "./dom.js";
-import { isovalue, isovaluePart, setIsovalue, shownField } from "./fields.js";
+import { isovalue, isovaluePart, shownField } from "./fields.js";
 import { rounded } from "./format.js";
 import { demo, volume } from "./page.js";
 import { beside, mode } from "./parts.js";
@@ -20,8 +20,8 @@ const middleOfPlane = { label: "Move the plane to the middle", act: () => movePl
 
 const whole = { label: "Show what is outside, too", act: () => store.change({ inside: false }) };
 
-function useMiddleOfRange() {
-  setIsovalue(0.5);
+function useFirstIsovalue() {
+  store.change({ isovalue: undefined });
   $("isovalue").focus();
 }
 
@@ -32,7 +32,7 @@ const MISSED = {
     const [value, low, high] = [isovalue(), min, max].map((x) => rounded(x, max - min));
     const isOutside = isovalue() < min || isovalue() > max;
     const words = isOutside ? `${value} is outside of the range of ${name}, ${low} to ${high}` : `${name} does not pass ${value} in this mesh`;
-    return { words: `There is no surface: ${words}.`, label: "Use the middle of the range", act: useMiddleOfRange };
+    return { words: `There is no surface: ${words}.`, label: "Use a value that it has", act: useFirstIsovalue };
   },
   slice: () => ({ words: `There is no section: the plane ${$("cut-text").textContent} does not pass through the mesh.`, ...middleOfPlane }),
   flow: () => ({ words: "There is no streamline: no seed is in the mesh where the field has a direction.", ...middleOfPlane }),

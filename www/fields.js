@@ -52,8 +52,7 @@ export function followingStep() {
 
 /** In units of the field. */
 export function isovalue() {
-  const { min, max } = shownField();
-  return store.state.isovalue ?? (min + max) / 2;
+  return store.state.isovalue ?? shownField().isovalue;
 }
 
 /** Where the isovalue is in the field's range, 0 to 1. */

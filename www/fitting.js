@@ -48,7 +48,8 @@ function pointsLeft(words, what) {
 
 /** The words of which the volume has something, and what it has not. @param {Words} words @returns {[kept: Words, lost: string[]]} */
 function fitting(words) {
-  const field = fieldNames().includes(words.field) ? words.field : fieldNames()[0];
+  const { fields, firstField } = volume();
+  const field = fieldNames().includes(words.field) ? words.field : fields[firstField].name;
   const [kept, lost] = [{ ...words }, /** @type {string[]} */ ([])];
   for (const [name, judge] of Object.entries(LIMITS)) {
     const judged = words[name] ? judge(words[name], field) : undefined;

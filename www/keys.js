@@ -17,9 +17,9 @@ import { switchTheme } from "./theme.js";
  * @typedef {{ keys: string[], what: string, act?: (event: KeyboardEvent) => void }} Key
  */
 
-const VIEWS = ["Surface", "Volume", "Slice", "Solid", "Mesh", "Flow"];
+const VIEWS = ["Boundary", "Isosurface", "Volume", "Slice", "Mesh", "Flow"];
 /** What can be shown beside the view, with Shift and a digit. */
-const BESIDE = ["the surface", "the volume", "the slice", "the boundary", "mesh wires", "the flow", "points"];
+const BESIDE = ["the boundary", "the isosurface", "the volume", "the slice", "mesh wires", "the flow", "points"];
 
 /** Chooses a view by its number. @param {number} number */
 function chooseView(number) {

@@ -56,5 +56,7 @@ function showPlane() {
 
 export function attachPlanes() {
   input("cut").addEventListener("input", () => movePlane(input("cut").valueAsNumber));
+  // What is not cut stays whole.
+  input("flip").addEventListener("input", () => store.state.places.cut % 1000 === 0 && movePlane(1000 - store.state.places.cut));
   store.subscribe(["view", "places", "axis", "flip"], showPlane);
 }

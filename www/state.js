@@ -7,7 +7,7 @@
 import { curveOf, curveWords } from "./curve.js";
 import { $, named } from "./dom.js";
 import { precise } from "./format.js";
-import { demo, page } from "./page.js";
+import { demo, page, volume } from "./page.js";
 import { Store } from "./store.js";
 import { fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js";
 
@@ -32,7 +32,7 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
  * @property {Record<string, boolean>} edges
  * @property {string} field
  * @property {number} time its step
- * @property {number | undefined} isovalue in units of the field; the middle of its range without it
+ * @property {number | undefined} isovalue in units of the field; that which is shown first without it
  * @property {{ cut: number, section: number }} places of the planes, in thousandths of the model's length
  * @property {"field" | "view"} refine
  * @property {number} error where its slider is
@@ -53,10 +53,15 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
 /** Words of the address: `get` gives none for what there is first, `set` never gets none and tells whether they mean something. */
 /** @typedef {{ get: (state: Readonly<State>) => string, set: (words: string, draft: State) => boolean }} Entry */
 
+/** What a volume is shown in first: what fills its box as an isosurface, all else by its boundary. @returns {Mode} */
+const firstView = () => (demo.info?.isBox === false ? "solid" : "iso");
+/** Nothing is cut off a boundary that is shown first. */
+const firstCut = () => (firstView() === "solid" ? (loaded.flip ? 0 : 1000) : MIDDLE);
+
 /** Parts that have an opacity, in the order that links have. */
 const SHEER = ["iso", "volume", "slice", "solid"];
 /** Parts whose edges can be drawn, and whether they are drawn first. @type {Record<string, boolean>} */
-const EDGES = { iso: false, slice: true, solid: true, mesh: true };
+const EDGES = { iso: false, slice: true, solid: false, mesh: true };
 const OPAQUE = 100;
 /** Of planes, in thousandths of the model's length. */
 export const MIDDLE = 500;
@@ -119,21 +124,24 @@ const list = (id, names) => ({
   },
 });
 
+/** The names of the fields, that which is shown first in front. */
+function firstFields() {
+  const { name } = volume().fields[volume().firstField];
+  return [name, ...fieldNames().filter((other) => other !== name)];
+}
+
 const colourNames = () => ["", ...fieldNames()];
 const vectorNames = () => [...vectors().keys(), ""];
 
-/** A choice of radio buttons. @param {"view" | "refine"} id @param {string} name @returns {Entry} */
-const radios = (id, name) => ({
-  get: (state) => (state[id] === loadedChoice(name) ? "" : state[id]),
+/** A choice of radio buttons. @param {"view" | "refine"} id @param {string} name @param {() => string} first @returns {Entry} */
+const radios = (id, name, first) => ({
+  get: (state) => (state[id] === first() ? "" : state[id]),
   set(words, draft) {
     const isOne = named(name).some(({ value }) => value === words);
     if (isOne) Object.assign(draft, { [id]: words });
     return isOne;
   },
 });
-
-/** @param {string} name */
-const loadedChoice = (name) => named(name).find(({ defaultChecked }) => defaultChecked)?.value ?? "";
 
 /** A place of the slider of errors. @param {"error" | "outside"} id @returns {Entry} */
 const errorPlace = (id) => ({
@@ -152,8 +160,9 @@ export const isSection = ({ view }) => view === "slice" || view === "flow";
 function place(isOther) {
   /** @param {Readonly<State>} state */
   const plane = (state) => (isSection(state) !== isOther ? "section" : "cut");
+  const first = (/** @type {"cut" | "section"} */ plane) => (plane === "cut" ? firstCut() : MIDDLE);
   return {
-    get: (state) => (state.places[plane(state)] === MIDDLE ? "" : String(state.places[plane(state)])),
+    get: (state) => (state.places[plane(state)] === first(plane(state)) ? "" : String(state.places[plane(state)])),
     set(words, draft) {
       if (Number(words) >= 0 && Number(words) <= 1000) draft.places = { ...draft.places, [plane(draft)]: Number(words) };
       return true;
@@ -179,7 +188,7 @@ export function cameraWords({ target, distance, yaw, pitch, projection }) {
 
 /** In the order of the address: what others depend on comes before them. @type {Record<string, Entry>} */
 const ENTRIES = {
-  view: radios("view", "mode"),
+  view: radios("view", "mode", firstView),
   also: {
     get: ({ also }) => String(also),
     set(words, draft) {
@@ -213,7 +222,7 @@ const ENTRIES = {
       return true;
     },
   },
-  field: list("field", fieldNames),
+  field: list("field", firstFields),
   "surface-colour": list("surface-colour", colourNames),
   vector: list("vector", vectorNames),
   isovalue: {
@@ -256,7 +265,7 @@ const ENTRIES = {
       return true;
     },
   },
-  refine: radios("refine", "refine-by"),
+  refine: radios("refine", "refine-by", () => FIRST.refine),
   error: errorPlace("error"),
   outside: errorPlace("outside"),
   box: {
@@ -301,7 +310,7 @@ const ENTRIES = {
 
 /** What there is first of what no volume changes. @type {Omit<Others, "field" | "box">} */
 export const FIRST = {
-  view: /** @type {Mode} */ (loadedChoice("mode")),
+  view: /** @type {Mode} */ ("iso"),
   also: [],
   opacities: Object.fromEntries(SHEER.map((name) => [name, OPAQUE])),
   edges: EDGES,
@@ -327,7 +336,8 @@ export const store = new Store(
 /** What there is first of the volume that is open. What is not in the address stays. @returns {State} */
 function first() {
   const { freeze, difference, split } = store.state;
-  return { ...store.state, ...loaded, ...FIRST, field: fieldNames()[0], vector: vectorNames()[0], box: inner(), freeze, difference, split };
+  const own = { view: firstView(), places: { ...FIRST.places, cut: firstCut() }, field: firstFields()[0], vector: vectorNames()[0], box: inner() };
+  return { ...store.state, ...loaded, ...FIRST, ...own, freeze, difference, split };
 }
 
 /** What fits the volume, and values that fit each other. @param {State} state @returns {State} */
@@ -338,7 +348,7 @@ function settled(state) {
   const log = state.log && rangeOf(state.field)[1] > 0;
   return {
     ...state,
-    view: state.view === "flow" && !hasVectors ? FIRST.view : state.view,
+    view: state.view === "flow" && !hasVectors ? firstView() : state.view,
     // A mesh is drawn in one way.
     also: state.also.every(canBe) ? state.also : state.also.filter(canBe),
     time: state.time < stepsOf(state.field).length ? state.time : 0,

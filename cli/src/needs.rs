@@ -61,7 +61,7 @@ pub struct Group {
     /// Only where the field has a value from a to b, in units of the field (repeatable)
     #[arg(long = "range", value_name = "a,b", value_parser = parse_range, allow_hyphen_values = true)]
     ranges: Vec<[f64; 2]>,
-    /// The field of all these values and errors [default: the first field]
+    /// The field of all these values and errors [default: the first that does not number something or say where it is, such as material]
     #[arg(long, value_name = "NAME")]
     field: Option<String>,
     /// What a camera sees, within --pixels: a file with its matrix and viewport (repeatable)

@@ -184,6 +184,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let about = About {
         bounds: answer.opened.session.view().bounds(),
+        is_box: answer.opened.session.is_box() == Some(true),
         field: &answer.opened.info()?.fields[answer.field],
     };
     let state = arguments.shown.state(&arguments.query, &about)?;
@@ -248,7 +249,8 @@ fn print_scene(arguments: &Arguments) -> Result<()> {
     let bounds = opened.session.view().bounds();
     let info = opened.info()?;
     let field = &info.fields[files::field_index(info, arguments.query.field()).with_context(name)?];
-    output::json(&arguments.shown.state(&arguments.query, &About { bounds, field })?)
+    let is_box = opened.session.is_box() == Some(true);
+    output::json(&arguments.shown.state(&arguments.query, &About { bounds, is_box, field })?)
 }
 
 /// A renderer of pictures of this size.

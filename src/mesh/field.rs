@@ -49,3 +49,71 @@ pub struct VectorPart {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<u8>,
 }
+
+/// Words in the names of arrays that number something or say where it is, as the usual programs write them.
+const NUMBERS_AND_PLACES: [&str; 23] = [
+    "id",
+    "ids",
+    "index",
+    "indices",
+    "number",
+    "label",
+    "labels",
+    "material",
+    "materials",
+    "part",
+    "parts",
+    "region",
+    "regions",
+    "block",
+    "blocks",
+    "domain",
+    "group",
+    "tag",
+    "rank",
+    "proc",
+    "coordinates",
+    "coords",
+    "coord",
+];
+
+/// Whether the name of an array says that it numbers something, or where it is: that is seldom what is to be looked at. Words of names end at
+/// signs, and where a large letter follows a small one.
+pub fn is_number_or_place(name: &str) -> bool {
+    let mut words = vec![String::new()];
+    let mut before = ' ';
+    for c in name.chars() {
+        if !c.is_alphabetic() || (before.is_lowercase() && c.is_uppercase()) {
+            words.push(String::new());
+        }
+        if let Some(word) = words.last_mut().filter(|_| c.is_alphabetic()) {
+            word.extend(c.to_lowercase());
+        }
+        before = c;
+    }
+    words.iter().any(|word| NUMBERS_AND_PLACES.contains(&word.as_str()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_number_or_place;
+
+    #[test]
+    fn numbers_and_places_are_told_by_the_words_of_a_name() {
+        for name in [
+            "GlobalNodeId",
+            "material",
+            "vtkOriginalPointIds",
+            "PartId",
+            "region_2",
+            "Coordinates",
+            "gmsh:physical-tag",
+        ] {
+            assert!(is_number_or_place(name), "{name}");
+        }
+        for name in ["pressure", "von_mises", "Temp", "fluid", "humidity", "blocked", "", "partial_pressure"]
+        {
+            assert!(!is_number_or_place(name), "{name}");
+        }
+    }
+}

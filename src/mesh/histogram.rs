@@ -144,6 +144,34 @@ impl Histogram {
     }
 }
 
+/// Where equal bins with these volumes are parted into a lower and an upper group that differ most, as a fraction of their range: the
+/// variance between the groups is largest (Otsu 1979). The middle if there are no two groups.
+pub fn parting(volumes: &[f64]) -> f64 {
+    let middles = || volumes.iter().zip(0_u32..).map(|(volume, b)| (volume, f64::from(b) + 0.5));
+    let total: f64 = volumes.iter().sum();
+    let moment: f64 = middles().map(|(volume, middle)| volume * middle).sum();
+    let (mut below, mut moment_below) = (0.0, 0.0);
+    // Between groups that are apart, any edge is as good: the middle one is taken.
+    let (mut most, mut first, mut last) = (0.0, 0.5 * volumes.len() as f64, 0.5 * volumes.len() as f64);
+    for (volume, middle) in middles() {
+        below += volume;
+        moment_below += volume * middle;
+        let above = total - below;
+        if below <= 0.0 || above <= 0.0 {
+            continue;
+        }
+        let apart = (moment - moment_below) / above - moment_below / below;
+        let variance = below * above * apart * apart;
+        let edge = middle + 0.5;
+        if variance > most * (1.0 + 1e-9) {
+            (most, first, last) = (variance, edge, edge);
+        } else if variance >= most * (1.0 - 1e-9) {
+            last = edge;
+        }
+    }
+    0.5 * (first + last) / volumes.len().max(1) as f64
+}
+
 /// The fraction of a tetrahedron in which the linear field with these values (ascending) at its corners is
 /// less than `x`: a cubic spline in `x`, in terms that are all positive.
 fn fraction_below([a, b, c, d]: [f64; 4], x: f64) -> f64 {
@@ -199,6 +227,35 @@ mod tests {
         assert!((fraction_below([0.0, 0.0, 0.0, 1.0], 0.5) - 0.875).abs() < 1e-15);
         assert!((fraction_below([0.0, 1.0, 1.0, 1.0], 0.5) - 0.125).abs() < 1e-15);
         assert!((fraction_below([0.0, 0.0, 1.0, 1.0], 0.5) - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_histogram_is_parted_between_its_groups() {
+        assert_eq!(parting(&[1.0, 0.0, 0.0, 1.0]), 0.5);
+        assert_eq!(parting(&[9.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0]), 0.45);
+        for nothing in [&[] as &[f64], &[0.0; 4], &[0.0, 0.0, 0.0, 1.0]] {
+            assert!([0.5, 0.0].contains(&parting(nothing)), "{nothing:?}");
+        }
+        // By its definition, over random ones: no edge parts them better.
+        let mut state = 3_u32;
+        for _ in 0..200 {
+            let volumes: Vec<f64> = (0..16)
+                .map(|_| {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    f64::from(state >> 24)
+                })
+                .collect();
+            let within = |edge: usize| {
+                let spread = |range: std::ops::Range<usize>| {
+                    let volume: f64 = volumes[range.clone()].iter().sum();
+                    let mean = range.clone().map(|b| volumes[b] * b as f64).sum::<f64>() / volume.max(1e-9);
+                    range.map(|b| volumes[b] * (b as f64 - mean).powi(2)).sum::<f64>()
+                };
+                spread(0..edge) + spread(edge..16)
+            };
+            let found = within((parting(&volumes) * 16.0) as usize);
+            assert!((1..16).all(|edge| found <= within(edge) * (1.0 + 1e-9)), "{volumes:?}");
+        }
     }
 
     /// A histogram with these volumes in bins of width 1.

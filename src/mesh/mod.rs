@@ -29,14 +29,14 @@ pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 #[doc(hidden)]
 pub use check::{check, check_arrays, check_topology};
 pub use error::MeshError;
-pub use field::{Field, VectorPart};
+pub use field::{Field, VectorPart, is_number_or_place};
 #[doc(hidden)]
 pub use geometry_field::GeometryField;
 #[doc(hidden)]
 pub use grow::growth_order;
 pub(crate) use grow::{Gate, Growth};
 #[doc(hidden)]
-pub use histogram::Histogram;
+pub use histogram::{Histogram, parting};
 pub(crate) use histogram::{Sum, volume_of};
 #[doc(hidden)]
 pub use input::{CellNumbers, InputCell, MeshInput, Note, SourceFiles};

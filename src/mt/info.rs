@@ -2,7 +2,7 @@
 
 use super::error::ErrorCode;
 use crate::geom::{Bounds, Lattice, SinglePoints, SingleValues};
-use crate::mesh::{Field, VectorPart};
+use crate::mesh::{Field, VectorPart, is_number_or_place};
 
 /// Which kind of update an MT is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,6 +180,18 @@ impl MtInfo {
         steps.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], step| {
             [low.min(step.min), high.max(step.max)]
         })
+    }
+
+    /// The field that is shown where none is asked for: the first that varies, is no component of a vector, and neither numbers something nor
+    /// says where it is, by its name; if all are that, the first that varies. 0 if none does.
+    pub fn first_field(&self) -> usize {
+        let varies = |field: &FieldInfo| field.max > field.min;
+        let tells = |field: &FieldInfo| {
+            let is_component = field.vector.as_ref().is_some_and(|part| part.component.is_some());
+            varies(field) && !is_component && !is_number_or_place(&field.name)
+        };
+        let first = |wanted: &dyn Fn(&FieldInfo) -> bool| self.fields.iter().position(wanted);
+        first(&tells).or_else(|| first(&varies)).unwrap_or(0)
     }
 
     /// The largest error of a field, in its units, at the reference vertices inside a mesh within `error`, where the input has them.

@@ -25,6 +25,7 @@ mod block_state;
 mod blocks;
 mod client;
 mod depths;
+mod first_picture;
 mod quantity;
 mod reading;
 
@@ -134,7 +135,10 @@ impl Session {
         // The base mesh may have arrived in front of an error.
         if let (None, Some(mt)) = (&self.front, self.decoder.mt()) {
             match Front::new(mt) {
-                Ok(front) => self.front = Some(front),
+                Ok(front) => {
+                    self.front = Some(front);
+                    self.field = mt.info().first_field();
+                }
                 Err(error) => {
                     let error = FormatError::Base(error);
                     self.failed = Some(error.clone());

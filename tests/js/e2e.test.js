@@ -58,7 +58,7 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   assert.ok(differing(surface, await picture(page, "isovalue")) > 0.01, "the isovalue changes the picture");
 
   let cut = surface;
-  for (const view of ["Volume", "Slice", "Solid", "Mesh"]) {
+  for (const view of ["Volume", "Slice", "Boundary", "Mesh"]) {
     await page.locator("label", { hasText: view }).first().click();
     const shown = await picture(page, view.toLowerCase());
     assertDrawn(shown);
@@ -290,7 +290,7 @@ test("each region that the page offers is refined", async () => {
 });
 
 /** The small volume at a coarse mesh, so that pictures come soon, in a view of the page. */
-async function openSmall(view = "Surface") {
+async function openSmall(view = "Isosurface") {
   const page = await open("data/bucky-small.mt");
   await reach(page, "complete");
   await setSlider(page, "error", 70);
@@ -404,14 +404,14 @@ test("the pointer reads values, clicks keep probes, and two of them give a plot"
   assert.equal(wrong[0], "bad-option");
   assert.match(wrong[1], /`to`/);
   // What is cut open is closed: the cut is in front of the boundary behind it. Cells are hit, too.
-  for (const view of ["Solid", "Mesh"]) {
+  for (const view of ["Boundary", "Mesh"]) {
     await show(page, view);
     await settle(page);
     const [found, cut] = await page.evaluate(async () => {
       const { viewer, info } = window.tetralodDemo;
       return [await viewer.pick(0, 0), (info.bounds[1] + info.bounds[4]) / 2];
     });
-    assert.ok(Math.abs(found.position[1] - cut) < (view === "Solid" ? 1e-6 : found.size), `${view}: ${JSON.stringify(found)}`);
+    assert.ok(Math.abs(found.position[1] - cut) < (view === "Boundary" ? 1e-6 : found.size), `${view}: ${JSON.stringify(found)}`);
   }
   await show(page, "Slice");
   await page.locator("#box-of-pins").click();
@@ -433,7 +433,7 @@ test("the pointer reads values, clicks keep probes, and two of them give a plot"
 });
 
 test("colours have ranges, and the transfer function is edited", async () => {
-  const page = await openSmall("Solid");
+  const page = await openSmall("Boundary");
   const range = () => page.evaluate(() => window.tetralodDemo.viewer.legend.range);
   const whole = await range();
   await page.selectOption("#range-preset", "percentiles");
@@ -703,7 +703,7 @@ test("the address has the whole state: a reload gives the same picture, undo and
   const first = await still(page, "state-first");
   await page.fill("#isovalue", "250");
   await addressed(page, /isovalue=/);
-  await show(page, "Solid");
+  await show(page, "Boundary");
   await page.selectOption("#map", "magma");
   await page.selectOption("#region", "box");
   await addressed(page, /view=solid.*map=magma.*region=box/);

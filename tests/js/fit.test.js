@@ -1,9 +1,10 @@
 // Promise: what of a scene fits another volume is kept, and what does not is named.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { changedScene, checkFields, fitScene } from "../../pkg/fit.js";
+import { changedScene, checkFields, fitScene, namesParts, withoutParts } from "../../pkg/fit.js";
 
 const volume = {
+  isBox: true,
   fields: [
     { name: "p", min: -1, max: 1 },
     { name: "u", min: 0, max: 4 },
@@ -35,7 +36,7 @@ test("what fits stays as it is", () => {
     colours: { range: [-5, 0], map: "grey" },
     background: "light",
   };
-  assert.deepEqual(fit(scene), { scene, dropped: [] });
+  assert.deepEqual(fit(scene), { scene, dropped: [], isFirst: false });
 });
 
 test("fields that the volume does not have go, with what needs them", () => {
@@ -96,7 +97,12 @@ test("values, planes, boxes, points and lengths of another volume go", () => {
   assert.deepEqual(fit({ streamlines: { fields: ["u", "u", "u"], seeds } }).scene.streamlines.seeds, [[0, 0, 0]]);
 });
 
-test("where nothing is left, there is the isosurface in the middle", () => {
+test("where nothing is named or left, there is the isosurface of a box, and the boundary of all else", () => {
+  const part = { ...volume, isBox: false };
+  assert.deepEqual(fit({ outline: false }), { scene: { outline: false, isosurfaces: [{}] }, dropped: [], isFirst: true });
+  assert.deepEqual(fitScene({ outline: false }, part), { scene: { outline: false, boundary: {} }, dropped: [], isFirst: true });
+  assert.ok(namesParts({ volume: null }) && !namesParts({ outline: true, colours: {} }));
+  assert.deepEqual(withoutParts({ outline: false, boundary: {}, slices: [] }), { outline: false });
   const flow = { fields: ["vx", "vy", "vz"], seeds: [] };
   assert.deepEqual(fit({ isosurfaces: [], streamlines: flow, outline: false }).scene, { isosurfaces: [{}], outline: false });
   assert.deepEqual(fit({ isosurfaces: [] }).scene, { isosurfaces: [] }, "an empty picture that was wanted");

@@ -62,9 +62,9 @@ test("all is reached with keys, and the list of keys has them", async () => {
   const page = await open(SMALL, undefined, VIEWPORT);
   await reach(page, "complete");
   for (const [key, view] of [
-    ["3", "slice"],
+    ["4", "slice"],
     ["5", "mesh"],
-    ["1", "iso"],
+    ["2", "iso"],
   ]) {
     await press(page, key);
     assert.equal(await page.locator("[name=mode]:checked").getAttribute("value"), view);
@@ -142,7 +142,7 @@ test("the page has no accessibility violations, light or dark", async () => {
   };
   for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
     await page.emulateMedia({ colorScheme });
-    for (const view of ["Surface", "Volume", "Slice", "Solid", "Mesh"]) {
+    for (const view of ["Isosurface", "Volume", "Slice", "Boundary", "Mesh"]) {
       await press(page, "g");
       await show(page, view);
       await check(`${view}, ${colorScheme}`);
@@ -394,7 +394,7 @@ test("an empty picture says why, and what does nothing is disabled", async () =>
     await page.locator("#empty").waitFor({ state: "hidden", timeout: PATIENCE });
   };
   const isDisabled = (id) => page.locator(`#${id}`).isDisabled();
-  await show(page, "Solid");
+  await show(page, "Boundary");
   await page.fill("#cut", "1000");
   await says(/Everything is cut away: the model lies between y = .* and /);
   // The section has a place of its own: what hid nothing of the solid does not hide it.
@@ -403,7 +403,7 @@ test("an empty picture says why, and what does nothing is disabled", async () =>
   await settle(page);
   assert.ok(await page.locator("#empty").isHidden());
   assert.ok((await demo(page, "frame")).triangles > 0);
-  await show(page, "Solid");
+  await show(page, "Boundary");
   assert.equal(await page.inputValue("#cut"), "0");
   await show(page, "Slice");
   // The box of the region cuts sections, too.
@@ -467,9 +467,9 @@ test("any views are shown together, and what is beside the view stays when its s
   assert.ok(await also(page, "iso").isHidden(), "the view itself needs no box");
   assert.ok(await also(page, "flow").isDisabled(), "there are no vectors");
   await also(page, "slice").check();
-  await press(page, "Shift+4");
+  await press(page, "Shift+1");
   await has("isosurfaces", "slices", "boundary");
-  await addressed(page, /also=slice,solid/);
+  await addressed(page, /also=solid,slice/);
   const together = await still(page, "together-three");
   assert.ok(differing(alone, together) > 0.05, "there is more to see");
   await screenshot(page, "page-together");
@@ -480,7 +480,7 @@ test("any views are shown together, and what is beside the view stays when its s
   assert.ok(await also(page, "iso").isChecked());
   assert.equal(differing(together, await still(page, "together-turned")), 0, "the picture stays");
   await page.fill("#opacity", "40");
-  await addressed(page, /view=slice&also=iso,solid&opacity=40/);
+  await addressed(page, /view=slice&also=solid,iso&opacity=40/);
   const opacities = () =>
     page.evaluate(() => [window.tetralodDemo.viewer.state.isosurfaces[0], window.tetralodDemo.viewer.state.slices[0]].map(({ opacity }) => opacity));
   assert.deepEqual(await opacities(), [1, 0.4]);
@@ -489,7 +489,7 @@ test("any views are shown together, and what is beside the view stays when its s
   await has("isosurfaces", "boundary", "cells");
   await page.selectOption("#shape", "points");
   assert.equal(await page.evaluate(() => window.tetralodDemo.viewer.state.cells.shape), "points");
-  await show(page, "Surface");
+  await show(page, "Isosurface");
   await has("isosurfaces", "boundary", "cells");
   assert.ok(await also(page, "points").isChecked(), "the points stay, too");
   await also(page, "wires").check();
@@ -767,7 +767,7 @@ test("what means nothing in the address is ignored, and said", async () => {
 test("a surface coloured by a field, with probes, gives way to another volume", async () => {
   const page = await open(FLOW, undefined, VIEWPORT);
   await reach(page, "complete");
-  await press(page, "1");
+  await press(page, "2");
   await page.selectOption("#surface-colour", { index: 2 });
   await settle(page);
   await page.locator("#canvas").focus();
@@ -862,7 +862,7 @@ test("a link to a file of the user asks for it, and shows it as in the link", as
 test("on a phone the card of a probe stays in the picture", async () => {
   const page = await open(FLOW, undefined, { viewport: { width: 360, height: 640 }, hasTouch: true, isMobile: true });
   await reach(page, "complete");
-  await page.locator("label", { hasText: "Solid" }).first().tap();
+  await page.locator("label", { hasText: "Boundary" }).first().tap();
   await settle(page);
   const stage = await page.locator("#canvas").boundingBox();
   let cards = 0;

@@ -50,8 +50,8 @@ pub struct BuildOptions {
     /// tetrahedra, but every one is answered from the base mesh. With --method insert only.
     #[arg(long)]
     tet_errors: bool,
-    /// A field to keep (repeatable, in this order), or a vector with all its components; the first field if not given. Where the
-    /// input has none of these names: distance (from the middle of the bounding box), x, y, z, or none, for the shape alone.
+    /// A field to keep (repeatable, in this order), or a vector with all its components; if not given, the first that does not number
+    /// something or say where it is, such as material or coordinates. Where the input has none of these names: distance (from the middle of the bounding box), x, y, z, or none, for the shape alone.
     #[arg(long = "field", value_name = "NAME")]
     fields: Vec<String>,
     /// Keep all fields but the lengths of vectors.

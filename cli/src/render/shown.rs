@@ -25,11 +25,11 @@ const COLOURS: &str = "Colours";
 #[command(next_help_heading = SHOWN)]
 pub struct Shown {
     /// What is shown; several between commas. Without it, what the options below are for, or else the
-    /// surface.
+    /// boundary; of a volume that fills its box, the isosurface.
     #[arg(long = "mode", value_name = "MODE,…", value_delimiter = ',')]
     modes: Vec<Mode>,
-    /// Isosurface at this value, in units of the field (repeatable) [default: the values of --iso, or the
-    /// middle of the field's range].
+    /// Isosurface at this value, in units of the field (repeatable) [default: the values of --iso, or that
+    /// which parts the volume best into two groups of values].
     #[arg(long = "isovalue", value_name = "V", value_parser = parse_number, allow_hyphen_values = true)]
     surfaces: Vec<f64>,
     /// Section with this plane: x=D, y=D or z=D, or the points p with n · p = D; in model units (repeatable)
@@ -98,7 +98,7 @@ pub struct Shown {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Mode {
     /// Isosurfaces.
-    Surface,
+    Isosurface,
     /// The volume as a cloud: emission and absorption.
     Volume,
     /// Sections.
@@ -165,6 +165,8 @@ fn quantities() -> PossibleValuesParser {
 /// What a scene needs to know of the volume.
 pub struct About<'a> {
     pub bounds: Bounds,
+    /// Whether the domain is that box.
+    pub is_box: bool,
     pub field: &'a FieldInfo,
 }
 
@@ -182,20 +184,25 @@ impl Shown {
     }
 
     /// What to add: the modes, or those that other options are for.
-    fn wanted(&self) -> Vec<Mode> {
+    fn wanted(&self, query: &Query, is_box: bool) -> Vec<Mode> {
         if !self.modes.is_empty() {
             return self.modes.clone();
         }
         // Those of a scene stay as they are.
         let has_cells = self.colour_by.is_some() || self.shrink.is_some() || self.cut.is_some();
+        let is_coloured = self.colour_field.is_some() && self.slices.is_empty();
+        let is_new = self.scene.is_none() && (!query.isovalues().is_empty() || is_coloured);
+        let has_surface = !self.surfaces.is_empty() || is_new;
         let implied = [
-            (Mode::Surface, !self.surfaces.is_empty()),
+            (Mode::Isosurface, has_surface),
             (Mode::Slice, !self.slices.is_empty()),
             (Mode::Volume, self.opacities.is_some()),
             (Mode::Cells, has_cells && self.scene.is_none()),
         ];
         let wanted: Vec<Mode> = implied.into_iter().filter(|(_, is)| *is).map(|(mode, _)| mode).collect();
-        if wanted.is_empty() && self.scene.is_none() { vec![Mode::Surface] } else { wanted }
+        let is_nothing = wanted.is_empty() && self.scene.is_none();
+        // The boundary of a box shows little.
+        if is_nothing { vec![if is_box { Mode::Isosurface } else { Mode::Boundary }] } else { wanted }
     }
 
     /// The scene.
@@ -204,7 +211,7 @@ impl Shown {
             Some(path) => read_json(path)?,
             None => SceneState::default(),
         };
-        let wanted = self.wanted();
+        let wanted = self.wanted(query, about.is_box);
         if !self.modes.is_empty() {
             hide_others(&mut state, &wanted);
         }
@@ -218,7 +225,7 @@ impl Shown {
 
     fn add(&self, mode: Mode, state: &mut SceneState, query: &Query, about: &About<'_>) -> Result<()> {
         match mode {
-            Mode::Surface => {
+            Mode::Isosurface => {
                 let given = &self.surfaces;
                 let values = if given.is_empty() { query.isovalues() } else { given };
                 let like = state.isosurfaces.first().cloned().unwrap_or_default();
@@ -263,14 +270,14 @@ impl Shown {
         let faces = !state.isosurfaces.is_empty() || !state.slices.is_empty() || state.boundary.is_some();
         let coloured = !state.isosurfaces.is_empty() || !state.slices.is_empty();
         let idle = [
-            ("isovalue", !self.surfaces.is_empty() && state.isosurfaces.is_empty(), "surface"),
+            ("isovalue", !self.surfaces.is_empty() && state.isosurfaces.is_empty(), "isosurface"),
             ("slice", !self.slices.is_empty() && state.slices.is_empty(), "slice"),
             ("opacities", self.opacities.is_some() && state.volume.is_none(), "volume"),
             ("colour-by", self.colour_by.is_some() && state.cells.is_none(), "cells, wire or points"),
             ("shrink", self.shrink.is_some() && state.cells.is_none(), "cells"),
             ("cut", self.cut.is_some() && state.cells.is_none(), "cells, wire or points"),
-            ("opacity", self.opacity.is_some() && !faces, "surface, slice or boundary"),
-            ("colour-field", self.colour_field.is_some() && !coloured, "surface or slice"),
+            ("opacity", self.opacity.is_some() && !faces, "isosurface, slice or boundary"),
+            ("colour-field", self.colour_field.is_some() && !coloured, "isosurface or slice"),
         ];
         if let Some((option, _, modes)) = idle.into_iter().find(|(_, is_idle, _)| *is_idle) {
             refuse_usage(&format!("--{option} is for what is not shown: add the mode {modes}"));
@@ -319,7 +326,7 @@ impl Shown {
 
 /// Leaves nothing in a scene but what some modes show.
 fn hide_others(state: &mut SceneState, shown: &[Mode]) {
-    if !shown.contains(&Mode::Surface) {
+    if !shown.contains(&Mode::Isosurface) {
         state.isosurfaces.clear();
     }
     if !shown.contains(&Mode::Slice) {

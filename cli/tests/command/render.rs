@@ -62,7 +62,7 @@ fn each_mode_is_a_picture_of_its_own_and_the_same_each_time() {
     let (_folder, mt, out) = prepared("modes", 9);
     let empty = draw(&mt, &out, &["--isovalue", "99"]);
     let mut drawn: Vec<Picture> = Vec::new();
-    for mode in ["surface", "volume", "slice", "boundary", "cells", "wire", "points", "surface,slice,wire"] {
+    for mode in ["isosurface", "volume", "slice", "boundary", "cells", "wire", "points", "isosurface,slice,wire"] {
         let picture = draw(&mt, &out, &["--mode", mode]);
         assert_eq!((picture.size, picture.channels), ([120, 90], 3), "{mode}");
         assert!(picture.differing(&empty) > 300, "{mode} is blank");
@@ -78,7 +78,7 @@ fn each_mode_is_a_picture_of_its_own_and_the_same_each_time() {
 #[test]
 fn options_change_the_picture() {
     let (_folder, mt, out) = prepared("options", 9);
-    let boundary = ["--mode", "boundary,surface"];
+    let boundary = ["--mode", "boundary,isosurface"];
     let before = draw(&mt, &out, &boundary);
     let sets: [&[&str]; 12] = [
         &["--clip", "y=0.5"],
@@ -160,10 +160,10 @@ fn what_cannot_be_drawn_is_refused() {
         (&["--map", "jet"], &["--map", "must be a colour map", "viridis", "balance"]),
         (&["--mode", "cloud"], &["--mode", "volume", "points"]),
         (&["--mode", "cells,wire"], &["one of the modes"]),
-        (&["--mode", "surface", "--shrink", "0.2"], &["--shrink", "add the mode cells"]),
-        (&["--mode", "cells", "--opacity", "0.2"], &["--opacity", "surface, slice or boundary"]),
+        (&["--mode", "isosurface", "--shrink", "0.2"], &["--shrink", "add the mode cells"]),
+        (&["--mode", "cells", "--opacity", "0.2"], &["--opacity", "isosurface, slice or boundary"]),
         (&["--mode", "cells", "--colour-by", "weight"], &["depth", "missing"]),
-        (&["--mode", "volume", "--colour-field", "density"], &["--colour-field", "surface or slice"]),
+        (&["--mode", "volume", "--colour-field", "density"], &["--colour-field", "isosurface or slice"]),
         (&["--size", "100"], &["--size", "1280x960"]),
         (&["--samples", "0"], &["--samples", "1..=1024"]),
         (&["--from", "x"], &["--from", "+x", "home"]),

@@ -9,7 +9,7 @@ pub struct BuildConfig {
     /// The kind of MT and how it is built.
     pub construction: Construction,
     /// Names of the fields to keep, in this order; a vector's name means its components. Of a time series all steps are
-    /// kept. The first field of the mesh if empty.
+    /// kept. If empty, the first field that does not number something or say where it is, by its name.
     pub fields: Vec<String>,
     /// Keep all fields but the lengths of vectors, which follow from their components; those that are named come first.
     pub all_fields: bool,

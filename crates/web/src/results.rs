@@ -70,6 +70,8 @@ pub fn info(session: &Session) -> Option<JsInfo> {
         ("tetrahedra", info.tetrahedra.into()),
         ("updates", info.updates.into()),
         ("exactValues", session.decoder().exact_status().name().into()),
+        ("isBox", session.is_box().into()),
+        ("firstField", info.first_field().into()),
     ]))
 }
 
@@ -95,6 +97,7 @@ fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
         ("vector", vector.unwrap_or(JsValue::UNDEFINED)),
         ("floor", (info.floor(index) * info.fields[index].range()).into()),
         ("histogram", histogram),
+        ("isovalue", session.first_isovalue(index).into()),
         ("curve", object(&[("errors", doubles(&errors)), ("bytes", doubles(&bytes))])),
     ])
 }

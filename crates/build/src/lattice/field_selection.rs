@@ -2,7 +2,7 @@
 
 use crate::{BuildConfig, BuildError};
 use std::collections::{HashMap, HashSet};
-use tetralod::mesh::{Field, TetMesh};
+use tetralod::mesh::{Field, TetMesh, is_number_or_place};
 use tetralod::mt::{Exact, VertexId};
 
 /// Most fields of an MT.
@@ -29,7 +29,7 @@ pub(crate) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<
         let is_length = |field: &Field| field.vector.as_ref().is_some_and(|v| v.component.is_none());
         in_steps(mesh, |field| !is_length(field)).into_iter().for_each(&mut add);
     } else if config.fields.is_empty()
-        && let Some(first) = mesh.fields.first()
+        && let Some(first) = first_field(mesh)
     {
         in_steps(mesh, |field| field.name == first.name).into_iter().for_each(&mut add);
     }
@@ -48,6 +48,12 @@ pub(crate) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<
         }
     }
     Ok(chosen)
+}
+
+/// The field that is kept where none is asked for: the first that does not number something or say where it is, if there is one.
+fn first_field(mesh: &TetMesh) -> Option<&Field> {
+    let tells = |field: &&Field| !is_number_or_place(&field.name);
+    mesh.fields.iter().find(tells).or(mesh.fields.first())
 }
 
 /// The fields for which `wanted` holds, in the order of the mesh, with the time steps of each field together.

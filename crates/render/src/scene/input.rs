@@ -59,6 +59,7 @@ impl Current {
             tet_values: &self.tet_values,
             info,
             shown: session.field(),
+            isovalue: session.first_isovalue(session.field()),
             state,
             bounds,
             changes: &self.changes,
@@ -81,6 +82,8 @@ pub(super) struct Input<'a> {
     pub info: &'a MtInfo,
     /// The number of the field.
     pub shown: usize,
+    /// The value of the isosurface that has none of its own.
+    pub isovalue: Option<f64>,
     pub state: &'a SceneState,
     pub bounds: Bounds,
     pub changes: &'a MeshChanges,

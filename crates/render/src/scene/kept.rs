@@ -58,7 +58,7 @@ impl Kept {
     pub fn list<'a>(
         &'a mut self,
         info: &'a MtInfo,
-        shown: usize,
+        (shown, isovalue): (usize, Option<f64>),
         state: &'a SceneState,
         bounds: Bounds,
         edits: &mut Vec<Edit<'a>>,
@@ -75,6 +75,7 @@ impl Kept {
             tet_values: place.and_then(|i| kept.quantities.get(i)).map_or(&[], Vec::as_slice),
             info,
             shown,
+            isovalue,
             state,
             bounds,
             changes: &kept.changes,

@@ -199,7 +199,7 @@ impl Scene {
             let mut left = Vec::new();
             let listed = kept.map_or(Ok(()), |kept| {
                 left.extend(first());
-                kept.list(info, field, state, bounds, &mut left)
+                kept.list(info, (field, session.first_isovalue(field)), state, bounds, &mut left)
             });
             edits.push(Edit::Beside { split, edits: left });
             listed?;

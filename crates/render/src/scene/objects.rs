@@ -142,8 +142,11 @@ impl Isosurface {
     fn update<'a>(&'a mut self, input: &Input<'a>, key: u32, state: &IsosurfaceState) -> Result<Edit<'a>> {
         let was_whole = std::mem::replace(&mut self.is_whole, false);
         let mesh = MeshView { field: input.field, ..input.mesh };
-        let [low, high] = input.info.range_at_all_times(input.shown);
-        let value = state.value.unwrap_or_else(|| f64::midpoint(low, high));
+        let middle = || {
+            let [low, high] = input.info.range_at_all_times(input.shown);
+            f64::midpoint(low, high)
+        };
+        let value = state.value.or(input.isovalue).unwrap_or_else(middle);
         self.surface.update(&mesh, &[value], &input.changes.vertices, &input.changes.tets);
         self.changes = self.surface.take_changes();
         let is_coloured = state.field.is_some() || input.largest_difference.is_some();

@@ -94,7 +94,7 @@ impl PlaneState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
 pub struct IsosurfaceState {
-    /// In units of the field; the middle of its range over all of its time steps if it is left out.
+    /// In units of the field; [`Session::first_isovalue`](tetralod::session::Session::first_isovalue) if it is left out.
     pub value: Option<f64>,
     /// 0 to 1.
     pub opacity: f64,

@@ -1,0 +1,38 @@
+//! What is worth to be shown of a volume when nothing is asked for.
+
+use super::Session;
+use crate::geom::orient3d;
+use crate::mesh::parting;
+use crate::mt::MultiTessellation;
+
+/// A domain that leaves no more than this part of its box empty is one.
+const EMPTY: f64 = 1e-3;
+
+impl Session {
+    /// The value of a field whose isosurface is worth to be shown first, at all of its times: that which parts the volume at the first time
+    /// into two groups of values that differ most (Otsu 1979). The middle of the range if the file has no histogram.
+    ///
+    /// None if there is no such field, or it has not arrived.
+    pub fn first_isovalue(&self, field: usize) -> Option<f64> {
+        let info = self.info()?;
+        let name = &info.fields.get(field)?.name;
+        let first = info.fields.iter().position(|other| other.name == *name)?;
+        let [low, high] = match self.decoder.histogram(first) {
+            Some(_) => [info.fields[first].min, info.fields[first].max],
+            None => info.range_at_all_times(field),
+        };
+        let part = self.decoder.histogram(first).map_or(0.5, |shares| parting(&shares));
+        Some(low * (1.0 - part) + high * part)
+    }
+
+    /// Whether the domain is the box around it, as that of a grid: then its boundary shows little. None before the base mesh is there.
+    pub fn is_box(&self) -> Option<bool> {
+        let (mt, bounds) = (self.mt()?, self.bounds()?);
+        let base = mt.base();
+        let corners = base.tets.iter().map(|tet| tet.map(|v| base.positions[v as usize]));
+        let steps: f64 = corners.map(|[a, b, c, d]| orient3d(a, b, c, d) as f64).sum();
+        let step: f64 = mt.info().lattice.step.iter().product();
+        let volume: f64 = (0..3).map(|k| bounds.max[k] - bounds.min[k]).product();
+        Some(steps * step / 6.0 >= (1.0 - EMPTY) * volume)
+    }
+}
