@@ -108,7 +108,7 @@ const MODES: Record<ViewerMode, (about: { values: number[]; middle: number | und
   cells: () => ({ cells: {} }),
 };
 const NOTHING: ViewerChanges = { isosurfaces: [], volume: null, slices: null, boundary: null, cells: null };
-/** No part is named: the viewer draws what is first. */
+/** No part is named: of what is opened, the viewer draws what is first. */
 const UNNAMED: ViewerChanges = { ...NOTHING, isosurfaces: null };
 
 /** What a viewer tells goes on from the element. */
@@ -333,7 +333,7 @@ export class TetralodViewerElement extends Base {
   /** What is drawn. */
   #scene(info?: MtInfo): ViewerChanges {
     const [map, background] = ["map", "background"].map((name) => this.getAttribute(name));
-    const mode = this.#mode;
+    const mode = this.#mode || (info && (info.isBox ? "isosurface" : "boundary"));
     const middle = info && (info.bounds[2] + info.bounds[5]) / 2;
     return {
       ...(mode ? { ...NOTHING, ...MODES[mode]({ values: this.#values, middle }) } : UNNAMED),

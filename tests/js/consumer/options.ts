@@ -136,6 +136,8 @@ const infos: Members<MtInfo> = {
   vertices: "number",
   tetrahedra: "number",
   exactValues: "string",
+  firstField: "number",
+  isBox: "boolean",
   updates: "number",
 };
 
@@ -151,6 +153,7 @@ const fields: Members<FieldInfo> = {
   vector: "object undefined",
   floor: "number",
   histogram: "object",
+  isovalue: "number",
   curve: "object",
 };
 
