@@ -77,6 +77,7 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{ExplicitMt, Mt, MultiTessellation, UpdateId, UpdatePages, VertexId, VertexMt};
+use tetralod::threads;
 
 /// Builds an MT of `mesh`, which must be valid: see [`tetralod::mesh::repair`]. [`build_with`] can be watched and stopped.
 ///
@@ -129,7 +130,21 @@ pub fn build_with<'a>(
     config: &BuildConfig,
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
-    let mut mesh = mesh.into();
+    let mesh = mesh.into();
+    // The threads reach one another sooner than from outside; progress is told where it is asked for.
+    let built = threads::inside(
+        |ask| build_inside(mesh, config, &mut |at| ask(at).unwrap_or(ControlFlow::Break(()))),
+        progress,
+    );
+    built.unwrap_or(Err(BuildError::Stopped))
+}
+
+/// [`build_with`] on one of the pool's threads.
+fn build_inside(
+    mut mesh: Cow<'_, TetMesh>,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult, BuildError> {
     restrict::restrictions::check(config)?;
     let result = match config.construction {
         Construction::Edge => {

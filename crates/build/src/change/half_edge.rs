@@ -1,7 +1,7 @@
 //! Filling a hole by contracting an edge: all that was at its one end moves to the other, which stays where it is.
 
 use crate::change::hole::{Filling, Hole};
-use crate::change::sides::FaceSet;
+use crate::change::sides::{FaceSet, bits};
 use crate::change::work_mesh::{LARGEST_STAR, StarTet, TetSet, WorkMesh};
 use tetralod::mesh::NONE;
 
@@ -34,15 +34,6 @@ pub(crate) fn contract(hole: &Hole, i: usize, filling: &mut Filling) -> bool {
         [x, y, z, b]
     }));
     lay_border(hole, b, cells, filling)
-}
-
-/// The faces of a set, ascending.
-fn bits(mut faces: FaceSet) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let first = (faces != 0).then(|| faces.trailing_zeros() as usize)?;
-        faces &= faces - 1;
-        Some(first)
-    })
 }
 
 /// Whether the tetrahedra between these faces and a further vertex are connected through faces. At the boundary the fan between the

@@ -1,7 +1,7 @@
 //! The hole that a vertex leaves when it is removed, what fills it, and how a filling is put into the mesh.
 
 use crate::change::collapse_check::Refusal;
-use crate::change::sides::{FaceSet, Sides};
+use crate::change::sides::{FaceSet, Sides, bits, rank};
 use crate::change::work_mesh::{ELSEWHERE, StarTet, TetSet, WorkMesh};
 use crate::geometry::flat::{Feature, Planes};
 use tetralod::geom::orient3d;
@@ -26,6 +26,8 @@ pub(crate) struct Hole {
     pub points: Vec<[i32; 3]>,
     /// The corners of each of `faces`, by their places in `link`.
     corners: Vec<[u8; 3]>,
+    /// What is across the faces of each tetrahedron of `star` opposite the corners of its face, but for the one that it was found from.
+    beside: Vec<[u32; 3]>,
     /// For each of `link` which of the faces have it.
     faces_at: Vec<FaceSet>,
     places: LinkPlaces,
@@ -126,32 +128,46 @@ pub(crate) enum Across {
 }
 
 impl Hole {
-    /// Collects the hole that the removal of `a` would leave.
+    /// Collects the hole that the removal of `a` would leave: the tetrahedra around it that are connected through faces.
     pub fn open(&mut self, mesh: &WorkMesh, positions: &[[i32; 3]], a: u32) -> Result<(), Refusal> {
-        self.a = a;
-        if !mesh.star(a, MAX_HOLE, &mut self.seen, &mut self.star) {
-            return Err(Refusal::Blocked);
-        }
-        self.clear();
-        for at in 0..self.star.len() {
-            let StarTet { tet, corner } = self.star[at];
-            let (corners, around) = (mesh.tets[tet as usize], self.seen.around(at));
-            let corner = usize::from(corner) % 4;
-            let [x, y, z] = FACES[corner];
-            self.add_face([corners[x], corners[y], corners[z]], around[corner], positions);
-            if around.contains(&NONE) {
-                self.add_border(corners, around, corner);
+        self.clear(a);
+        let first = mesh.incident[a as usize];
+        let tet = mesh.tets[first as usize];
+        let corner = corner_of(tet, a);
+        let [x, y, z] = FACES[corner];
+        self.seen.insert(first);
+        let places = [x, z, y].map(|k| self.place_of(tet[k], positions));
+        self.add(mesh, StarTet { tet: first, corner: corner as u8 }, ([x, z, y], places), None);
+        let mut next = 0;
+        while next < self.star.len() {
+            for (k, t) in self.beside[next].into_iter().enumerate() {
+                if t >= ELSEWHERE || !self.seen.insert(t) {
+                    continue;
+                }
+                // It shares the vertex with the one that it is found from, and the edge opposite the `k`-th corner of that one's face.
+                let (tet, [m, n]) = (mesh.tets[t as usize], [(k + 2) % 3, (k + 1) % 3]);
+                let (x, y) = (self.faces[next].0[m], self.faces[next].0[n]);
+                let [at, i, j] = [a, x, y].map(|v| corner_of(tet, v));
+                let other = (6 - at - i - j) % 4;
+                let places =
+                    [self.corners[next][m], self.corners[next][n], self.place_of(tet[other], positions)];
+                if self.star.len() >= MAX_HOLE || self.link.len() > MAX_LINK {
+                    return Err(Refusal::Blocked);
+                }
+                self.add(mesh, StarTet { tet: t, corner: at as u8 }, ([i, j, other], places), Some(2));
             }
-            if self.link.len() > MAX_LINK {
-                return Err(Refusal::Blocked);
-            }
+            next += 1;
         }
         self.find_planes(positions);
         Ok(())
     }
 
-    fn clear(&mut self) {
+    fn clear(&mut self, a: u32) {
+        self.a = a;
+        self.star.clear();
+        self.seen.clear();
         self.faces.clear();
+        self.beside.clear();
         self.link.clear();
         self.points.clear();
         self.corners.clear();
@@ -160,49 +176,45 @@ impl Hole {
         self.border.clear();
     }
 
-    /// Adds the face of the next tetrahedron of the star opposite the vertex, and what lies there.
+    /// The place of a vertex in the link, at the end of which it is put if it is new.
     #[inline]
-    fn add_face(&mut self, [x, y, z]: [u32; 3], outer: u32, positions: &[[i32; 3]]) {
-        let at = self.faces.len();
-        // Two of the corners are those of the tetrahedron that it was found from.
-        let known = match at {
-            0 => ([NONE; 3], [NO_PLACE; 3]),
-            _ => (self.faces[self.seen.parent(at)].0, self.corners[self.seen.parent(at)]),
-        };
-        let own = 1 << at;
-        let i = self.add_corner(x, known, own, positions);
-        let j = self.add_corner(y, known, own, positions);
-        let k = self.add_corner(z, known, own, positions);
-        self.faces.push(([x, z, y], outer));
-        self.corners.push([i, k, j]);
-    }
-
-    /// Adds a corner of a face, which is `own`. `known` are vertices with their places. Returns its place in the link.
-    #[inline]
-    fn add_corner(&mut self, v: u32, known: ([u32; 3], [u8; 3]), own: FaceSet, positions: &[[i32; 3]]) -> u8 {
-        if let Some(i) = (0..3).find(|&i| known.0[i] == v) {
-            let place = known.1[i];
-            self.faces_at[usize::from(place)] |= own;
-            return place;
-        }
+    fn place_of(&mut self, v: u32, positions: &[[i32; 3]]) -> u8 {
         let place = self.places.place(&mut self.link, v);
-        match self.faces_at.get_mut(usize::from(place)) {
-            Some(faces) => *faces |= own,
-            None => {
-                self.faces_at.push(own);
-                self.points.push(positions[v as usize]);
-            }
+        if usize::from(place) == self.points.len() {
+            self.points.push(positions[v as usize]);
+            self.faces_at.push(0);
         }
         place
     }
 
-    /// Adds the boundary triangles of a tetrahedron at the vertex, its `corner`.
-    fn add_border(&mut self, corners: [u32; 4], around: [u32; 4], corner: usize) {
-        for k in (0..4).filter(|&k| k != corner && around[k] == NONE) {
-            let face = FACES[k];
-            let at = face.iter().position(|&l| l == corner).unwrap_or(0);
-            self.border.push([1, 2].map(|i| corners[face[(at + i) % 3]]));
+    /// Adds a tetrahedron of the star: its face opposite the vertex is that of these corners, which are at these places of the link. Across
+    /// the face opposite the corner `from` is the one that it was found from.
+    #[inline]
+    fn add(
+        &mut self,
+        mesh: &WorkMesh,
+        s: StarTet,
+        (face, places): ([usize; 3], [u8; 3]),
+        from: Option<usize>,
+    ) {
+        // Read as soon as the tetrahedron is known: the memory delivers several at a time.
+        let (tet, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
+        let [x, y, z] = face.map(|k| tet[k]);
+        let mut beside = face.map(|k| around[k]);
+        for (k, edge) in [[y, z], [z, x], [x, y]].into_iter().enumerate() {
+            if beside[k] == NONE {
+                self.border.push(edge);
+            }
         }
+        if let Some(from) = from {
+            beside[from] = NONE;
+        }
+        let own = 1 << self.star.len();
+        places.iter().for_each(|&place| self.faces_at[usize::from(place)] |= own);
+        self.star.push(s);
+        self.faces.push(([x, y, z], around[usize::from(s.corner)]));
+        self.corners.push(places);
+        self.beside.push(beside);
     }
 
     /// Gets ready for [`Hole::is_seen_from`].
@@ -229,6 +241,12 @@ impl Hole {
     pub fn others(&self, i: usize) -> FaceSet {
         let all = FaceSet::MAX >> (FaceSet::BITS as usize - self.faces.len());
         all & !self.faces_at[i]
+    }
+
+    /// The corners of a face, by their places in the link.
+    #[inline]
+    pub fn corners_of(&self, face: usize) -> [usize; 3] {
+        self.corners[face].map(usize::from)
     }
 
     /// The faces that have all of these vertices.
@@ -340,6 +358,25 @@ impl Hole {
         }
     }
 
+    /// As [`Hole::link_filling`], where the vertex is moved to link vertex `i`: each edge of the link is one of two faces, or of one at the
+    /// boundary.
+    pub fn link_contraction(&self, i: usize, across: &mut Vec<[Across; 4]>) {
+        let cells = self.others(i);
+        across.clear();
+        across.extend(bits(cells).map(|face| {
+            let beyond = |m: usize, n: usize| {
+                let other = self.faces_at[m] & self.faces_at[n] & !(1 << face);
+                match other.trailing_zeros() {
+                    FaceSet::BITS => Across::Nothing,
+                    other if cells >> other & 1 == 1 => Across::Inside(rank(cells, other as usize) as u8),
+                    other => Across::Face(other as u8),
+                }
+            };
+            let [x, y, z] = self.corners_of(face);
+            [beyond(y, z), beyond(z, x), beyond(x, y), Across::Face(face as u8)]
+        }));
+    }
+
     /// Fills the hole, with fewer tetrahedra than were in it, after [`Hole::link_filling`]. Writes their numbers to `slots`, in the
     /// order of the filling. What is outside of the hole may have changed since it was opened.
     pub fn replace(&self, mesh: &mut WorkMesh, filling: &Filling, slots: &mut Vec<u32>) {
@@ -382,6 +419,12 @@ impl Hole {
 /// The boundary triangles in the place of those at the removed vertex.
 fn moved(filling: &Filling, positions: &[[i32; 3]]) -> impl Iterator<Item = [[i32; 3]; 3]> {
     filling.border[..filling.moved].iter().map(|&(_, t)| t.map(|v| positions[v as usize]))
+}
+
+/// Which corner of a tetrahedron a vertex is.
+#[inline]
+fn corner_of(tet: [u32; 4], v: u32) -> usize {
+    usize::from(tet[1] == v) | (usize::from(tet[2] == v) << 1) | (usize::from(tet[3] == v) * 3)
 }
 
 /// The places of three vertices in ascending order, as one number.

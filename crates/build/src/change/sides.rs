@@ -7,6 +7,21 @@ const SHORT_BITS: u32 = 16;
 /// A set of faces of a hole: bit `i` is that of the `i`-th.
 pub(crate) type FaceSet = u64;
 
+/// The faces of a set, ascending.
+pub(crate) fn bits(mut faces: FaceSet) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let first = (faces != 0).then(|| faces.trailing_zeros() as usize)?;
+        faces &= faces - 1;
+        Some(first)
+    })
+}
+
+/// How many of a set come before a face.
+#[inline]
+pub(crate) fn rank(faces: FaceSet, face: usize) -> usize {
+    (faces & ((1 << face) - 1)).count_ones() as usize
+}
+
 /// The planes of faces.
 #[derive(Default)]
 pub(crate) struct Sides {

@@ -62,7 +62,7 @@ impl Default for TetSet {
 
 impl TetSet {
     /// Empties the set.
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         if self.epoch == u32::MAX {
             self.table.fill(0);
             self.epoch = 0;
@@ -72,19 +72,19 @@ impl TetSet {
 
     /// The neighbours of the `i`-th tetrahedron of the star that was found last.
     #[inline]
-    pub fn around(&self, i: usize) -> [u32; 4] {
+    fn around(&self, i: usize) -> [u32; 4] {
         self.around[i % LARGEST_STAR]
     }
 
     /// From which tetrahedron of that star the `i`-th was found, across a face.
     #[inline]
-    pub fn parent(&self, i: usize) -> usize {
+    fn parent(&self, i: usize) -> usize {
         usize::from(self.parents[i % LARGEST_STAR])
     }
 
     /// Adds a tetrahedron; false if it is there already. Only after [`TetSet::clear`], and no more than [`LARGEST_STAR`].
     #[inline]
-    fn insert(&mut self, t: u32) -> bool {
+    pub fn insert(&mut self, t: u32) -> bool {
         let entry = u64::from(self.epoch) << 32 | u64::from(t);
         // Fibonacci hashing: the highest bits of the product depend on all of the number.
         let mut place = (t.wrapping_mul(0x9E37_79B9) >> 16) as usize;

@@ -82,11 +82,13 @@ impl Key {
         (self.cost >> 32) as u32
     }
 
-    pub fn no_earlier_than(mut self, level: u16) -> Self {
-        if self.level() < level {
-            self.cost = self.cost & ((1 << 48) - 1) | u64::from(level) << 48;
-        }
-        self
+    /// The same at another level.
+    pub fn at_level(self, level: u16) -> Self {
+        Self { cost: self.cost & ((1 << 48) - 1) | u64::from(level) << 48, ..self }
+    }
+
+    pub fn no_earlier_than(self, level: u16) -> Self {
+        self.at_level(self.level().max(level))
     }
 }
 

@@ -5,13 +5,14 @@
 use crate::change::gift_wrap::{Around, GiftWrap, is_new};
 use crate::change::half_edge::{Nearby, contract, keeps_topology, may_contract};
 use crate::change::hole::{Filling, Hole};
+use crate::change::sides::rank;
 use crate::change::work_mesh::WorkMesh;
 use crate::decimate::candidate_queue::{Key, Levels};
+use crate::error::centre::{Centre, Seat};
 use crate::error::cost::largest;
 use crate::error::fill_cost::{FillCost, HoleCost, Input, Removals};
-use crate::error::points::{as_vec, squared_length};
+use crate::error::points::squared_length;
 use crate::error::reference::{Buckets, Reference};
-use crate::lattice::quantize::Quantized;
 use crate::order::reach;
 use crate::order::reach::{Reach, Ruler};
 use crate::restrict::restrictions::Restrictions;
@@ -29,8 +30,6 @@ pub(crate) struct History {
 /// What the evaluation of a candidate reads.
 pub(crate) struct State<'a> {
     pub mesh: WorkMesh,
-    /// Average gradient of each field at each vertex, in levels per lattice step.
-    pub gradients: Vec<DVec3>,
     pub reference: Reference<'a>,
     pub frozen: Vec<bool>,
     /// Vertices that belong to a part of the domain that is built elsewhere, too: their stars are not all here. Empty where there is none.
@@ -70,7 +69,6 @@ impl<'a> State<'a> {
         let quantized = reference.quantized;
         let History { buckets, removals, reaches } = history;
         Self {
-            gradients: quantized.gradients(&mesh.tets),
             reference,
             frozen,
             open: Vec::new(),
@@ -113,8 +111,9 @@ pub(crate) struct RemovalSearch {
     around: Around,
     /// Whether the filling that `best` is depends on tetrahedra outside of the hole.
     looked_around: bool,
-    /// Link vertices with the predicted error of contracting the edge to them, and their places in the link: see [`end`].
-    ends: Vec<u128>,
+    centre: Centre,
+    /// The neighbours that the vertex may be moved to.
+    ends: Vec<End>,
     /// The filling that is evaluated, and the best one so far.
     now: Candidate,
     pub best: Candidate,
@@ -134,9 +133,15 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    fn evaluate(&mut self, hole: &Hole, hole_cost: &HoleCost, state: &State<'_>, limit: f64) {
+    fn evaluate(
+        &mut self,
+        (hole, hole_cost): (&Hole, &mut HoleCost),
+        state: &State<'_>,
+        limit: f64,
+        seat: Option<(usize, DVec3)>,
+    ) {
         let input = Input { hole, filling: &self.filling, reference: &state.reference };
-        self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input);
+        self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input, seat);
     }
 }
 
@@ -149,6 +154,7 @@ impl RemovalSearch {
             nearby: Nearby::default(),
             around: Around::default(),
             looked_around: false,
+            centre: Centre::default(),
             ends: Vec::new(),
             now: Candidate::default(),
             best: Candidate::default(),
@@ -163,7 +169,10 @@ impl RemovalSearch {
         let is_due = found.is_some_and(|found| found.level() <= level);
         if is_due {
             self.hole.sort_faces();
-            self.hole.link_filling(&mut self.best.filling);
+            match self.hole.place(self.best_end) {
+                Some(end) => self.hole.link_contraction(end, &mut self.best.filling.across),
+                None => self.hole.link_filling(&mut self.best.filling),
+            }
             self.version_of_end = state.version(self.best_end);
         }
         is_due
@@ -202,48 +211,56 @@ impl RemovalSearch {
     fn find_end(&mut self, state: &State<'_>, known: u32, level: u16) -> Option<Key> {
         self.hole.find_sides();
         self.list_ends(state, known);
-        let a = self.hole.a;
-        let least = state.levels.of(largest(&self.hole_cost.errors));
-        // What it is but for the tetrahedra that are left.
-        let (centre, second) = (state.reference.quantized.positions[a as usize], state.second(a, 0));
         let mut found: Option<Key> = None;
         for at in 0..self.ends.len() {
-            let (b, i) = vertex_and_place(self.ends[at]);
-            let second = second + self.hole.left_at(i);
-            let length = squared_length(centre, self.hole.points[i]);
-            // Its error is at least that of the hole. So most ends cannot be better than the best one so far, whatever
-            // their own is.
-            let is_worse = |found| Key::new(least, second, length, a, b) > found;
-            if found.is_some_and(is_worse) || !self.contract(state, i) {
+            let End { least, place, seat } = self.ends[at];
+            if found.is_some_and(|found| least > found) {
+                break;
+            }
+            if !self.contract(state, place) {
                 continue;
+            }
+            if least.level() > level {
+                // So are all that come after it.
+                return Some(least);
             }
             let limit = state.levels.largest(found.map_or(level, |found| found.level().min(level)));
             let Self { hole, hole_cost, now, .. } = self;
-            now.evaluate(hole, hole_cost, state, limit);
-            let key = Key::new(state.levels.of(self.now.error), second, length, a, b);
+            let seat = seat.map(|seat| (rank(hole.others(place), seat.face), seat.lambda));
+            now.evaluate((hole, hole_cost), state, limit, seat);
+            let key = least.at_level(state.levels.of(self.now.error));
             if found.is_none_or(|found| key < found) {
                 found = Some(key);
-                self.best_end = b;
+                self.best_end = key.b;
                 std::mem::swap(&mut self.now, &mut self.best);
             }
         }
         found
     }
 
-    /// Lists the ends to try, those with the least predicted error first: `known` alone unless that is [`NONE`]. Most do not make
-    /// positive tetrahedra, and are left out.
+    /// Lists the ends to try, those with the least lower bound of their key first: `known` alone unless that is [`NONE`]. Most do not
+    /// make positive tetrahedra, and are left out.
     fn list_ends(&mut self, state: &State<'_>, known: u32) {
-        let Self { ends, hole, .. } = self;
+        let Self { ends, hole, hole_cost, centre, .. } = self;
         ends.clear();
-        if known != NONE {
-            let place = hole.place(known).filter(|&i| may_contract(hole, i));
-            ends.extend(place.map(|i| end(0.0, known, i)));
-            return;
+        let reference = &state.reference;
+        let (a, own) = (hole.a, largest(&hole_cost.errors));
+        // What it is but for the tetrahedra that are left.
+        let (at, second) = (reference.quantized.positions[a as usize], state.second(a, 0));
+        let places = match known {
+            NONE => 0..hole.link.len(),
+            _ => hole.place(known).map_or(0..0, |i| i..i + 1),
+        };
+        centre.start(hole, reference);
+        for i in places.filter(|&i| may_contract(hole, i)) {
+            let seat = centre.seat(hole, i);
+            // The error at the removed vertex is mostly the largest.
+            let error = seat.map_or(own, |seat| own.max(centre.error_at(seat, hole, i, reference)));
+            let length = squared_length(at, hole.points[i]);
+            let least = Key::new(state.levels.of(error), second + hole.left_at(i), length, a, hole.link[i]);
+            ends.push(End { least, place: i, seat });
         }
-        let own = Prediction::new(&state.reference, &state.gradients, hole.a);
-        let seen = (0..hole.link.len()).filter(|&i| may_contract(hole, i));
-        ends.extend(seen.map(|i| end(own.error_at(hole.link[i], hole.points[i]), hole.link[i], i)));
-        ends.sort_unstable();
+        ends.sort_unstable_by_key(|end| end.least);
     }
 
     /// Fills the hole by moving its vertex to link vertex `i`, one of the ends, if that may be.
@@ -288,52 +305,19 @@ impl RemovalSearch {
             return None;
         }
         let limit = state.levels.largest(level);
-        best.evaluate(hole, hole_cost, state, limit);
+        best.evaluate((hole, hole_cost), state, limit, None);
         let (error, tets) = (state.levels.of(self.best.error), self.best.filling.tets.len() as u32);
         Some(Key::new(error, state.second(self.hole.a, tets), 0.0, self.hole.a, NONE))
     }
 }
 
-/// A neighbour and its place in the link as a number: by predicted error, which is not negative, then by vertex.
-#[inline]
-fn end(error: f64, vertex: u32, place: usize) -> u128 {
-    // Bits of floats that are not negative compare as the floats do.
-    u128::from(error.to_bits()) << 64 | u128::from(vertex) << 32 | place as u128
-}
-
-/// The vertex of an end, and its place.
-#[inline]
-fn vertex_and_place(end: u128) -> (u32, usize) {
-    ((end >> 32) as u32, end as u32 as usize)
-}
-
-/// Predicts what it costs to contract edges at one vertex.
-struct Prediction<'a> {
-    quantized: &'a Quantized,
-    position: DVec3,
-    levels: &'a [i32],
-    gradients: &'a [DVec3],
-}
-
-impl<'a> Prediction<'a> {
-    fn new(reference: &Reference<'a>, gradients: &'a [DVec3], a: u32) -> Self {
-        let quantized = reference.quantized;
-        let fields = quantized.fields.len();
-        let own = a as usize * fields..(a as usize + 1) * fields;
-        let (levels, gradients) = (&quantized.levels[own.clone()], &gradients[own]);
-        Self { quantized, position: quantized.rounded(a), levels, gradients }
-    }
-
-    /// The second difference of the fields along the edge to `b`, which is at `q`, as an error.
-    #[inline]
-    fn error_at(&self, b: u32, q: [i32; 3]) -> f64 {
-        let Self { quantized, position, levels, gradients } = *self;
-        let apart = as_vec(q) - position;
-        let mut largest = 0.0_f64;
-        for (f, field) in quantized.fields.iter().enumerate() {
-            let rise = f64::from(quantized.level(b, f) - levels[f]);
-            largest = largest.max((rise - gradients[f].dot(apart)).abs() * field.step / field.range());
-        }
-        largest
-    }
+/// A neighbour that the vertex may be moved to.
+#[derive(Clone, Copy)]
+struct End {
+    /// A lower bound of its key.
+    least: Key,
+    /// Its place in the link.
+    place: usize,
+    /// Where the vertex is in the filling, unless it is outside.
+    seat: Option<Seat>,
 }

@@ -2,6 +2,8 @@
 
 use super::{BuildCriterion, Decimated, Decimator, Key, Levels, Reference, State, WorkMesh};
 use crate::change::gift_wrap::GiftWrap;
+use crate::change::sides::rank;
+use crate::error::centre::{Centre, Seat};
 use crate::error::cost::largest;
 use crate::insert::sequence::{Insertion, Sequence};
 use crate::lattice::location::Location;
@@ -670,6 +672,58 @@ fn the_best_neighbour_is_found() {
             decimator.rounds.end(removed, left - removed);
         }
         assert!(name == "one cell" || compared > 0 && several > 0, "{name}: {compared}, {several}");
+    }
+}
+
+/// What a contraction makes of a hole is known from the hole: where the vertex is in it, and what is across its faces.
+#[test]
+fn a_contraction_is_known_from_its_hole() {
+    for (name, mesh) in domains() {
+        let quantized = quantize::quantize(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
+        let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
+        let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
+        let levels = Levels::of_purpose(Purpose::Uniform);
+        let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
+        let mut record = Sequence::default();
+        let state = State::new(work, reference, topology.non_manifold, levels);
+        let mut decimator = Decimator::new(state, None, &mut record);
+        let (mut inside, mut linked) = (0, 0);
+        for round in 0..6 {
+            let Decimator { state, searches, .. } = &mut decimator;
+            let search = &mut searches.ahead[0];
+            let mut centre = Centre::default();
+            let vertices = (0..mesh.positions.len() as u32).filter(|&v| state.mesh.has(v));
+            for v in vertices.filter(|&v| !state.frozen[v as usize]).collect::<Vec<u32>>() {
+                let Some(key) = search.at(state, v, NONE, levels.last()) else { continue };
+                assert!(search.prepare(state, key, levels.last()), "{name}: vertex {v}");
+                let (hole, filling) = (&search.hole, &mut search.best.filling);
+                let end = hole.place(key.b).expect("the end is in the link");
+                let across = filling.across.clone();
+                hole.link_filling(filling);
+                assert_eq!(across, filling.across, "{name}: vertex {v}");
+                linked += 1;
+                centre.start(hole, &state.reference);
+                let place = state.reference.quantized.places.at(v);
+                let Some(Seat { face, lambda }) = centre.seat(hole, end) else {
+                    assert!(
+                        hole.on_boundary() || state.reference.quantized.is_moved(v),
+                        "{name}: {round} {v}"
+                    );
+                    continue;
+                };
+                let tet = filling.tets[rank(hole.others(end), face)];
+                let [w, x, y, z] = tet.map(|corner| state.reference.quantized.rounded(corner));
+                let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
+                let found = w * weights[0] + x * weights[1] + y * weights[2] + z * weights[3];
+                assert!(weights.iter().all(|weight| *weight > -1e-8), "{name}: vertex {v} at {weights:?}");
+                assert!(found.distance(place) < 1e-6 * (1.0 + w.distance(place)), "{name}: vertex {v}");
+                inside += 1;
+            }
+            decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
+            let (removed, left) = (decimator.record.steps.len(), mesh.positions.len());
+            decimator.rounds.end(removed, left - removed);
+        }
+        assert!(name == "one cell" || inside > 0 && linked > 0, "{name}: {inside}, {linked}");
     }
 }
 

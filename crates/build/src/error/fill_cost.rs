@@ -31,6 +31,10 @@ pub(crate) struct HoleCost {
     pub depends: bool,
     /// The least error of this removal in each field.
     pub errors: Vec<f64>,
+    /// The points in the buckets of its tetrahedra, once they are [`gathered`](HoleCost::gather). What put a filling beyond its limit
+    /// comes first: it is likely to do the same to the next one.
+    points: Vec<u32>,
+    is_gathered: bool,
     /// Scratch space: the removals that it depends on.
     makers: Vec<u32>,
 }
@@ -86,7 +90,8 @@ impl Removals {
     /// What the hole's tetrahedra leave to the removal of its vertex.
     pub fn find_hole_cost(&self, hole: &Hole, reference: &Reference<'_>, cost: &mut HoleCost) {
         let fields = reference.quantized.fields.len();
-        let HoleCost { inherited, depends, errors, makers } = cost;
+        let HoleCost { inherited, depends, errors, makers, is_gathered, .. } = cost;
+        *is_gathered = false;
         inherited.clear();
         // All are read before any is looked at: the memory delivers several at a time.
         makers.clear();
@@ -105,20 +110,38 @@ impl Removals {
     }
 }
 
+impl HoleCost {
+    /// Reads the lists of points once for all fillings of a hole.
+    fn gather(&mut self, hole: &Hole, buckets: &Buckets) {
+        if !std::mem::replace(&mut self.is_gathered, true) {
+            self.points.clear();
+            self.points.extend(hole.star.iter().flat_map(|s| buckets.inside.iter(s.tet)));
+        }
+    }
+}
+
 impl FillCost {
     /// Whether the boundary stays where it is.
     pub fn is_flat(&self) -> bool {
         self.flat
     }
 
-    /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned.
-    pub fn evaluate(&mut self, hole_cost: &HoleCost, buckets: &Buckets, limit: f64, input: Input<'_>) -> f64 {
+    /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned. `seat`: where the removed
+    /// vertex is in a filling by contraction, if that is known.
+    pub fn evaluate(
+        &mut self,
+        hole_cost: &mut HoleCost,
+        buckets: &Buckets,
+        limit: f64,
+        input: Input<'_>,
+        seat: Option<(usize, DVec3)>,
+    ) -> f64 {
         let Input { hole, filling, reference } = input;
         let positions = &reference.quantized.positions;
         self.step = 0.0;
         self.placement.start(filling.tets.len());
         self.placement.errors.clone_from(&hole_cost.errors);
-        self.compare_centre(input);
+        self.compare_centre(input, seat);
         if largest(&self.placement.errors) > limit {
             return largest(&self.placement.errors);
         }
@@ -143,14 +166,14 @@ impl FillCost {
         let placement = &mut self.placement;
         let mut error = largest(&placement.errors);
         let mut hint = 0;
-        for s in &hole.star {
-            for point in buckets.inside.iter(s.tet) {
-                let (own, cell) = placement.place(point, hint, &input);
-                hint = cell;
-                error = error.max(own);
-                if error > limit {
-                    return error;
-                }
+        hole_cost.gather(hole, buckets);
+        for i in 0..hole_cost.points.len() {
+            let (own, cell) = placement.place(hole_cost.points[i], hint, &input);
+            hint = cell;
+            error = error.max(own);
+            if error > limit {
+                hole_cost.points.swap(0, i);
+                return error;
             }
         }
         let rim = hole.border.iter().flatten().chain([&hole.a]);
@@ -161,8 +184,15 @@ impl FillCost {
 
     /// Compares the field at the removed vertex first: the error is mostly largest there. If the lattice has moved the vertex, it is in a
     /// bucket.
-    fn compare_centre(&mut self, input: Input<'_>) {
+    fn compare_centre(&mut self, input: Input<'_>, seat: Option<(usize, DVec3)>) {
         let (a, quantized) = (input.hole.a, input.reference.quantized);
+        if let Some((cell, lambda)) = seat {
+            if !quantized.is_moved(a) {
+                self.placement.moved_to(a, cell);
+            }
+            self.placement.compare(a, cell, lambda, &input);
+            return;
+        }
         if !quantized.is_moved(a) {
             self.placement.place(a, 0, &input);
             return;

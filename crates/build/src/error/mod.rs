@@ -1,6 +1,7 @@
 //! What a change costs: how far the field and the boundary are from the reference, at every reference vertex concerned.
 
 pub(crate) mod boundary_distance;
+pub(crate) mod centre;
 pub(crate) mod cost;
 pub(crate) mod fill_cost;
 pub(crate) mod outside_points;

@@ -140,6 +140,11 @@ impl Placement {
         (self.compare(point, cell, lambda, new).max(displaced), cell)
     }
 
+    /// Notes the cell that contains a point.
+    pub fn moved_to(&mut self, point: u32, cell: usize) {
+        self.moves.push((point, cell as i32));
+    }
+
     /// The largest error at those of `points`, which are in other buckets, that the new cells contain.
     pub fn place_foreign(&mut self, points: impl Iterator<Item = u32>, new: &impl Replacement) -> f64 {
         self.foreign.clear();
