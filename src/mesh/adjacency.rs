@@ -251,16 +251,19 @@ fn stars(points: usize, tets: &[[u32; 4]]) -> Groups {
 /// Reused buffers for the links of vertices.
 #[derive(Default)]
 struct LinkScratch {
-    /// Groups of star tetrahedra that hang together by faces at the vertex.
-    tets: DisjointSets,
-    /// Groups of corners of link triangles: one group a link vertex unless the surface is pinched there.
-    corners: DisjointSets,
-    /// The link's vertices.
+    /// Which tetrahedra of the star have been reached.
+    reached: Vec<bool>,
+    /// Those whose neighbours are still to be looked at.
+    next: Vec<usize>,
+    /// The link's vertices, some of them several times.
     vertices: Vec<u32>,
 }
 
 impl LinkScratch {
     /// Whether the link of `v` is one surface without pinches, and a sphere or a disc by its Euler number.
+    ///
+    /// A connected surface has an Euler number of at most 2, at most 1 with a rim, and only the sphere and the disc reach it. A pinch
+    /// makes one vertex of several, and the number smaller: so it is reached without pinches only.
     fn link_is_sphere_or_disc(
         &mut self,
         v: u32,
@@ -268,38 +271,39 @@ impl LinkScratch {
         tets: &[[u32; 4]],
         neighbors: &[[u32; 4]],
     ) -> bool {
-        self.tets.reset(star.len());
-        self.corners.reset(4 * star.len());
-        self.vertices.clear();
+        let Self { reached, next, vertices } = self;
+        reached.clear();
+        reached.resize(star.len(), false);
+        next.clear();
+        vertices.clear();
         // Link edges are the faces at `v`; every inner one is seen from both of its sides.
-        let (mut inner_sides, mut boundary) = (0, 0);
-        for (local, &t) in star.iter().enumerate() {
-            let tet = tets[t as usize];
-            self.vertices.extend(tet.iter().filter(|&&w| w != v));
+        let (mut inner_sides, mut boundary, mut left) = (0, 0, star.len() - 1);
+        reached[0] = true;
+        next.push(0);
+        vertices.extend(tets[star[0] as usize].into_iter().filter(|&w| w != v));
+        while let Some(local) = next.pop() {
+            let t = star[local];
+            let (tet, around) = (tets[t as usize], neighbors[t as usize]);
             for face in (0..4).filter(|&i| tet[i] != v) {
-                let other = neighbors[t as usize][face];
-                let Ok(other_local) = star.binary_search(&other) else {
+                let Ok(other) = star.binary_search(&around[face]) else {
                     boundary += 1;
                     continue;
                 };
                 inner_sides += 1;
-                self.tets.join(local, other_local);
-                for corner in (0..4).filter(|&k| k != face && tet[k] != v) {
-                    let twin = tets[other as usize].iter().position(|w| *w == tet[corner]);
-                    if let Some(twin) = twin {
-                        self.corners.join(4 * local + corner, 4 * other_local + twin);
-                    }
+                if !std::mem::replace(&mut reached[other], true) {
+                    left -= 1;
+                    next.push(other);
+                    // The others of its vertices are those of the face.
+                    vertices.extend(tets[star[other] as usize].into_iter().filter(|w| !tet.contains(w)));
                 }
             }
         }
-        self.vertices.sort_unstable();
-        self.vertices.dedup();
-        // The corner at `v` itself of each tetrahedron is a group of its own: no triangle has it.
-        let corner_groups = self.corners.count - star.len();
-        if self.tets.count != 1 || corner_groups != self.vertices.len() {
+        if left > 0 {
             return false;
         }
-        let euler = (self.vertices.len() + star.len()) as i64 - (inner_sides / 2 + boundary) as i64;
+        vertices.sort_unstable();
+        vertices.dedup();
+        let euler = (vertices.len() + star.len()) as i64 - (inner_sides / 2 + boundary) as i64;
         euler == if boundary == 0 { 2 } else { 1 }
     }
 }
