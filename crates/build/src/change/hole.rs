@@ -2,7 +2,7 @@
 
 use crate::change::collapse_check::Refusal;
 use crate::change::sides::{FaceSet, Sides, bits, rank};
-use crate::change::work_mesh::{ELSEWHERE, StarTet, TetSet, WorkMesh};
+use crate::change::work_mesh::{ELSEWHERE, StarTet, WorkMesh};
 use crate::geometry::flat::{Feature, Planes};
 use tetralod::geom::orient3d;
 use tetralod::mesh::{FACES, NONE};
@@ -26,10 +26,10 @@ pub(crate) struct Hole {
     pub points: Vec<[i32; 3]>,
     /// The corners of each of `faces`, by their places in `link`.
     corners: Vec<[u8; 3]>,
-    /// What is across the faces of each tetrahedron of `star` opposite the corners of its face, but for the one that it was found from.
-    beside: Vec<[u32; 3]>,
+    /// What is across faces of the tetrahedra of `star`, in their order.
+    beside: Vec<Beside>,
     /// For each of `link` which of the faces have it.
-    faces_at: Vec<FaceSet>,
+    faces_at: FacesAt,
     places: LinkPlaces,
     /// Edges `xy` of the boundary triangles `axy`, which are ordered as seen from outside.
     pub border: Vec<[u32; 2]>,
@@ -44,10 +44,32 @@ pub(crate) struct Hole {
     sides: Sides,
     /// The numbers of the faces in the order of their vertices, once [`Hole::sort_faces`] has sorted them.
     pub sorted: Vec<u8>,
-    seen: TetSet,
 }
 
 const _: () = assert!(MAX_HOLE <= FaceSet::BITS as usize);
+
+/// More than the vertices of a link may be until it is found to be too large.
+const MOST_PLACES: usize = 64;
+
+const _: () = assert!(MAX_LINK + 1 < MOST_PLACES);
+
+/// A tetrahedron across a face of one of the star, and the places in the link of the two vertices that they share with `a`.
+#[derive(Clone, Copy)]
+struct Beside {
+    tet: u32,
+    corners: [u32; 4],
+    around: [u32; 4],
+    places: [u8; 2],
+}
+
+/// Sets of faces by places in a link.
+struct FacesAt([FaceSet; MOST_PLACES]);
+
+impl Default for FacesAt {
+    fn default() -> Self {
+        Self([0; MOST_PLACES])
+    }
+}
 
 /// Finds the places of vertices in a link: a hash table with open addressing, at most a quarter full.
 struct LinkPlaces([u8; LINK_TABLE]);
@@ -58,6 +80,13 @@ const NO_PLACE: u8 = u8::MAX;
 impl Default for LinkPlaces {
     fn default() -> Self {
         Self([NO_PLACE; LINK_TABLE])
+    }
+}
+
+impl FacesAt {
+    #[inline]
+    fn of(&self, place: usize) -> FaceSet {
+        self.0[place % MOST_PLACES]
     }
 }
 
@@ -135,29 +164,26 @@ impl Hole {
         let tet = mesh.tets[first as usize];
         let corner = corner_of(tet, a);
         let [x, y, z] = FACES[corner];
-        self.seen.insert(first);
-        let places = [x, z, y].map(|k| self.place_of(tet[k], positions));
-        self.add(mesh, StarTet { tet: first, corner: corner as u8 }, ([x, z, y], places), None);
+        let places = [x, z, y].map(|k| self.place_of(tet[k]));
+        let star_tet = StarTet { tet: first, corner: corner as u8 };
+        self.add(mesh, star_tet, (tet, mesh.neighbors[first as usize]), ([x, z, y], places));
         let mut next = 0;
-        while next < self.star.len() {
-            for (k, t) in self.beside[next].into_iter().enumerate() {
-                if t >= ELSEWHERE || !self.seen.insert(t) {
-                    continue;
-                }
-                // It shares the vertex with the one that it is found from, and the edge opposite the `k`-th corner of that one's face.
-                let (tet, [m, n]) = (mesh.tets[t as usize], [(k + 2) % 3, (k + 1) % 3]);
-                let (x, y) = (self.faces[next].0[m], self.faces[next].0[n]);
-                let [at, i, j] = [a, x, y].map(|v| corner_of(tet, v));
-                let other = (6 - at - i - j) % 4;
-                let places =
-                    [self.corners[next][m], self.corners[next][n], self.place_of(tet[other], positions)];
-                if self.star.len() >= MAX_HOLE || self.link.len() > MAX_LINK {
-                    return Err(Refusal::Blocked);
-                }
-                self.add(mesh, StarTet { tet: t, corner: at as u8 }, ([i, j, other], places), Some(2));
-            }
+        while let Some(&Beside { tet: t, corners: tet, around, places: [m, n] }) = self.beside.get(next) {
             next += 1;
+            if self.is_closed(m, n) {
+                continue;
+            }
+            let [own, i, j] =
+                [a, self.link[usize::from(m)], self.link[usize::from(n)]].map(|v| corner_of(tet, v));
+            let other = (6 - own - i - j) % 4;
+            let places = [m, n, self.place_of(tet[other])];
+            if self.star.len() >= MAX_HOLE || self.link.len() > MAX_LINK {
+                return Err(Refusal::Blocked);
+            }
+            let star_tet = StarTet { tet: t, corner: own as u8 };
+            self.add(mesh, star_tet, (tet, around), ([i, j, other], places));
         }
+        self.points.extend(self.link.iter().map(|&v| positions[v as usize]));
         self.find_planes(positions);
         Ok(())
     }
@@ -165,56 +191,60 @@ impl Hole {
     fn clear(&mut self, a: u32) {
         self.a = a;
         self.star.clear();
-        self.seen.clear();
         self.faces.clear();
         self.beside.clear();
         self.link.clear();
         self.points.clear();
         self.corners.clear();
-        self.faces_at.clear();
         self.places.0.fill(NO_PLACE);
         self.border.clear();
     }
 
     /// The place of a vertex in the link, at the end of which it is put if it is new.
     #[inline]
-    fn place_of(&mut self, v: u32, positions: &[[i32; 3]]) -> u8 {
+    fn place_of(&mut self, v: u32) -> u8 {
+        let new = self.link.len();
         let place = self.places.place(&mut self.link, v);
-        if usize::from(place) == self.points.len() {
-            self.points.push(positions[v as usize]);
-            self.faces_at.push(0);
+        if usize::from(place) == new {
+            self.faces_at.0[new % MOST_PLACES] = 0;
         }
         place
     }
 
-    /// Adds a tetrahedron of the star: its face opposite the vertex is that of these corners, which are at these places of the link. Across
-    /// the face opposite the corner `from` is the one that it was found from.
+    /// Whether both tetrahedra of the star at an edge of the link have been found.
+    #[inline]
+    fn is_closed(&self, m: u8, n: u8) -> bool {
+        let faces = self.faces_at.of(m.into()) & self.faces_at.of(n.into());
+        faces & (faces - 1) != 0
+    }
+
+    /// Adds a tetrahedron of the star, given its corners and what is around it: its face opposite the vertex is that of these corners,
+    /// which are at these places of the link.
     #[inline]
     fn add(
         &mut self,
         mesh: &WorkMesh,
         s: StarTet,
+        (tet, around): ([u32; 4], [u32; 4]),
         (face, places): ([usize; 3], [u8; 3]),
-        from: Option<usize>,
     ) {
-        // Read as soon as the tetrahedron is known: the memory delivers several at a time.
-        let (tet, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
-        let [x, y, z] = face.map(|k| tet[k]);
-        let mut beside = face.map(|k| around[k]);
-        for (k, edge) in [[y, z], [z, x], [x, y]].into_iter().enumerate() {
-            if beside[k] == NONE {
+        let own = 1 << self.star.len();
+        places.iter().for_each(|&place| self.faces_at.0[usize::from(place) % MOST_PLACES] |= own);
+        let [x, y, z] = face.map(|k| tet[k % 4]);
+        self.star.push(s);
+        self.faces.push(([x, y, z], around[usize::from(s.corner) % 4]));
+        self.corners.push(places);
+        for (k, edge, m, n) in [(0, [y, z], 2, 1), (1, [z, x], 0, 2), (2, [x, y], 1, 0)] {
+            let t = around[face[k] % 4];
+            if t == NONE {
                 self.border.push(edge);
             }
+            if t < ELSEWHERE && !self.is_closed(places[m], places[n]) {
+                // Read as soon as it is known, long before it is used: the memory delivers several at a time.
+                let (corners, around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
+                self.beside.push(Beside { tet: t, corners, around, places: [places[m], places[n]] });
+            }
         }
-        if let Some(from) = from {
-            beside[from] = NONE;
-        }
-        let own = 1 << self.star.len();
-        places.iter().for_each(|&place| self.faces_at[usize::from(place)] |= own);
-        self.star.push(s);
-        self.faces.push(([x, y, z], around[usize::from(s.corner)]));
-        self.corners.push(places);
-        self.beside.push(beside);
     }
 
     /// Gets ready for [`Hole::is_seen_from`].
@@ -233,14 +263,14 @@ impl Hole {
     /// Whether all faces but those at link vertex `i` make positive tetrahedra with it.
     #[inline]
     pub fn is_seen_from(&self, i: usize) -> bool {
-        self.sides.are_seen_from(self.points[i], self.others(i))
+        self.sides.are_seen_from((i, self.points[i]), self.others(i))
     }
 
     /// The faces that link vertex `i` is no corner of.
     #[inline]
     pub fn others(&self, i: usize) -> FaceSet {
         let all = FaceSet::MAX >> (FaceSet::BITS as usize - self.faces.len());
-        all & !self.faces_at[i]
+        all & !self.faces_at.of(i)
     }
 
     /// The corners of a face, by their places in the link.
@@ -251,13 +281,13 @@ impl Hole {
 
     /// The faces that have all of these vertices.
     pub fn faces_with<'a>(&self, vertices: impl Iterator<Item = &'a u32>) -> FaceSet {
-        let at = |v: &u32| self.place(*v).map_or(0, |i| self.faces_at[i]);
+        let at = |v: &u32| self.place(*v).map_or(0, |i| self.faces_at.of(i));
         vertices.map(at).fold(FaceSet::MAX, |all, faces| all & faces)
     }
 
     /// The faces that share an edge with a face, and itself.
     pub fn faces_beside(&self, face: usize) -> FaceSet {
-        let [x, y, z] = self.corners[face].map(|i| self.faces_at[usize::from(i)]);
+        let [x, y, z] = self.corners[face].map(|i| self.faces_at.of(usize::from(i)));
         x & y | y & z | z & x
     }
 
@@ -270,13 +300,13 @@ impl Hole {
     /// Whether an edge of the link joins these of its vertices, or they are the same.
     #[inline]
     pub fn has_edge(&self, x: usize, y: usize) -> bool {
-        self.faces_at[x] & self.faces_at[y] != 0
+        self.faces_at.of(x) & self.faces_at.of(y) != 0
     }
 
     /// Whether a face of the hole has these three of the link's vertices.
     #[inline]
     pub fn has_face(&self, x: usize, y: usize, z: usize) -> bool {
-        self.faces_at[x] & self.faces_at[y] & self.faces_at[z] != 0
+        self.faces_at.of(x) & self.faces_at.of(y) & self.faces_at.of(z) != 0
     }
 
     /// How many tetrahedra there are if the vertex moves to link vertex `i`.
@@ -365,7 +395,7 @@ impl Hole {
         across.clear();
         across.extend(bits(cells).map(|face| {
             let beyond = |m: usize, n: usize| {
-                let other = self.faces_at[m] & self.faces_at[n] & !(1 << face);
+                let other = self.faces_at.of(m) & self.faces_at.of(n) & !(1 << face);
                 match other.trailing_zeros() {
                     FaceSet::BITS => Across::Nothing,
                     other if cells >> other & 1 == 1 => Across::Inside(rank(cells, other as usize) as u8),

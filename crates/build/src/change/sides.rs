@@ -25,8 +25,8 @@ pub(crate) fn rank(faces: FaceSet, face: usize) -> usize {
 /// The planes of faces.
 #[derive(Default)]
 pub(crate) struct Sides {
-    /// Positions are relative to this one.
-    origin: [i32; 3],
+    /// The points relative to the first one, where floating-point numbers are exact.
+    relative: Vec<[f64; 3]>,
     /// For each face the normal and its product with a corner, where these are exact.
     short: Vec<[f64; 4]>,
     /// Else for each face a corner and the normal.
@@ -36,23 +36,24 @@ pub(crate) struct Sides {
 impl Sides {
     /// Finds the planes of faces, given their corners by number among these points.
     pub fn find(&mut self, points: &[[i32; 3]], faces: &[[u8; 3]]) {
-        self.origin = points[0];
-        self.short.clear();
-        self.long.clear();
-        let corners = |face: &[u8; 3]| face.map(|i| points[usize::from(i)]);
+        let Self { relative, short, long } = self;
+        short.clear();
+        long.clear();
         if !is_short(points) {
-            self.long.extend(faces.iter().map(|face| long_plane(corners(face))));
+            let corners = |face: &[u8; 3]| face.map(|i| points[usize::from(i)]);
+            long.extend(faces.iter().map(|face| long_plane(corners(face))));
             return;
         }
-        let origin = self.origin;
-        self.short.extend(faces.iter().map(|face| short_plane(corners(face).map(|p| relative(p, origin)))));
+        relative.clear();
+        relative.extend(points.iter().map(|p| from(points[0], *p)));
+        short.extend(faces.iter().map(|face| short_plane(face.map(|i| relative[usize::from(i)]))));
     }
 
-    /// Whether a point lies on the inner sides of all of these faces.
+    /// Whether the `n`-th of the points, which is `p`, lies on the inner sides of all of these faces.
     #[inline]
-    pub fn are_seen_from(&self, p: [i32; 3], faces: FaceSet) -> bool {
+    pub fn are_seen_from(&self, (n, p): (usize, [i32; 3]), faces: FaceSet) -> bool {
         let mut left = faces;
-        let [x, y, z] = relative(p, self.origin);
+        let [x, y, z] = self.relative.get(n).copied().unwrap_or_default();
         while left != 0 {
             let i = left.trailing_zeros() as usize;
             left &= left - 1;
@@ -88,7 +89,7 @@ fn is_short(points: &[[i32; 3]]) -> bool {
 }
 
 #[inline]
-fn relative(p: [i32; 3], origin: [i32; 3]) -> [f64; 3] {
+fn from(origin: [i32; 3], p: [i32; 3]) -> [f64; 3] {
     [f64::from(p[0] - origin[0]), f64::from(p[1] - origin[1]), f64::from(p[2] - origin[2])]
 }
 
@@ -123,10 +124,10 @@ mod tests {
             let faces: Vec<[u8; 3]> = (0..28).map(|i| [i, i + 1, i + 2]).collect();
             let mut sides = Sides::default();
             sides.find(&points, &faces);
-            for &p in &points {
+            for (n, &p) in points.iter().enumerate() {
                 for (i, face) in faces.iter().enumerate() {
                     let [a, b, c] = face.map(|v| points[usize::from(v)]);
-                    assert_eq!(sides.are_seen_from(p, 1 << i), orient3d(a, b, c, p) > 0, "{bits} bits");
+                    assert_eq!(sides.are_seen_from((n, p), 1 << i), orient3d(a, b, c, p) > 0, "{bits} bits");
                 }
             }
         }

@@ -62,7 +62,7 @@ impl Default for TetSet {
 
 impl TetSet {
     /// Empties the set.
-    pub fn clear(&mut self) {
+    fn clear(&mut self) {
         if self.epoch == u32::MAX {
             self.table.fill(0);
             self.epoch = 0;
@@ -84,7 +84,7 @@ impl TetSet {
 
     /// Adds a tetrahedron; false if it is there already. Only after [`TetSet::clear`], and no more than [`LARGEST_STAR`].
     #[inline]
-    pub fn insert(&mut self, t: u32) -> bool {
+    fn insert(&mut self, t: u32) -> bool {
         let entry = u64::from(self.epoch) << 32 | u64::from(t);
         // Fibonacci hashing: the highest bits of the product depend on all of the number.
         let mut place = (t.wrapping_mul(0x9E37_79B9) >> 16) as usize;

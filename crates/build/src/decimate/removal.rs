@@ -5,7 +5,7 @@
 use crate::change::gift_wrap::{Around, GiftWrap, is_new};
 use crate::change::half_edge::{Nearby, contract, keeps_topology, may_contract};
 use crate::change::hole::{Filling, Hole};
-use crate::change::sides::rank;
+use crate::change::sides::FaceSet;
 use crate::change::work_mesh::WorkMesh;
 use crate::decimate::candidate_queue::{Key, Levels};
 use crate::error::centre::{Centre, Seat};
@@ -16,7 +16,6 @@ use crate::error::reference::{Buckets, Reference};
 use crate::order::reach;
 use crate::order::reach::{Reach, Ruler};
 use crate::restrict::restrictions::Restrictions;
-use glam::DVec3;
 use tetralod::mesh::NONE;
 
 /// What removals leave besides the mesh.
@@ -138,10 +137,10 @@ impl Candidate {
         (hole, hole_cost): (&Hole, &mut HoleCost),
         state: &State<'_>,
         limit: f64,
-        seat: Option<(usize, DVec3)>,
+        contraction: (FaceSet, Option<Seat>),
     ) {
         let input = Input { hole, filling: &self.filling, reference: &state.reference };
-        self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input, seat);
+        self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input, contraction);
     }
 }
 
@@ -226,8 +225,7 @@ impl RemovalSearch {
             }
             let limit = state.levels.largest(found.map_or(level, |found| found.level().min(level)));
             let Self { hole, hole_cost, now, .. } = self;
-            let seat = seat.map(|seat| (rank(hole.others(place), seat.face), seat.lambda));
-            now.evaluate((hole, hole_cost), state, limit, seat);
+            now.evaluate((hole, hole_cost), state, limit, (hole.others(place), seat));
             let key = least.at_level(state.levels.of(self.now.error));
             if found.is_none_or(|found| key < found) {
                 found = Some(key);
@@ -305,7 +303,7 @@ impl RemovalSearch {
             return None;
         }
         let limit = state.levels.largest(level);
-        best.evaluate((hole, hole_cost), state, limit, None);
+        best.evaluate((hole, hole_cost), state, limit, (0, None));
         let (error, tets) = (state.levels.of(self.best.error), self.best.filling.tets.len() as u32);
         Some(Key::new(error, state.second(self.hole.a, tets), 0.0, self.hole.a, NONE))
     }

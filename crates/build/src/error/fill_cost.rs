@@ -5,6 +5,8 @@
 //! makes; all other tetrahedra keep theirs, and their errors.
 
 use crate::change::hole::{Filling, Hole};
+use crate::change::sides::{FaceSet, rank};
+use crate::error::centre::Seat;
 use crate::error::cost::largest;
 use crate::error::placement::{Placement, Replacement};
 use crate::error::points::{SLACK, bounds};
@@ -31,9 +33,9 @@ pub(crate) struct HoleCost {
     pub depends: bool,
     /// The least error of this removal in each field.
     pub errors: Vec<f64>,
-    /// The points in the buckets of its tetrahedra, once they are [`gathered`](HoleCost::gather). What put a filling beyond its limit
-    /// comes first: it is likely to do the same to the next one.
-    points: Vec<u32>,
+    /// The points in the buckets of its tetrahedra and their numbers in the star, once they are [`gathered`](HoleCost::gather). What put
+    /// a filling beyond its limit comes first: it is likely to do the same to the next one.
+    points: Vec<(u32, u8)>,
     is_gathered: bool,
     /// Scratch space: the removals that it depends on.
     makers: Vec<u32>,
@@ -77,6 +79,8 @@ impl Replacement for Input<'_> {
 #[derive(Default)]
 pub(crate) struct FillCost {
     pub placement: Placement,
+    /// Scratch space: for each tetrahedron of the star where to look first for its points.
+    hints: Vec<usize>,
     flat: bool,
     /// How far the boundary moves, as an error.
     pub step: f64,
@@ -114,8 +118,7 @@ impl HoleCost {
     /// Reads the lists of points once for all fillings of a hole.
     fn gather(&mut self, hole: &Hole, buckets: &Buckets) {
         if !std::mem::replace(&mut self.is_gathered, true) {
-            self.points.clear();
-            self.points.extend(hole.star.iter().flat_map(|s| buckets.inside.iter(s.tet)));
+            buckets.inside.gather(hole.star.iter().map(|s| s.tet), &mut self.points);
         }
     }
 }
@@ -126,17 +129,19 @@ impl FillCost {
         self.flat
     }
 
-    /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned. `seat`: where the removed
-    /// vertex is in a filling by contraction, if that is known.
+    /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned. `cells`: the faces of the
+    /// hole that the tetrahedra of a filling by contraction have, in their order; none for other fillings. `seat`: where the removed
+    /// vertex is in it, if that is known.
     pub fn evaluate(
         &mut self,
         hole_cost: &mut HoleCost,
         buckets: &Buckets,
         limit: f64,
         input: Input<'_>,
-        seat: Option<(usize, DVec3)>,
+        (cells, seat): (FaceSet, Option<Seat>),
     ) -> f64 {
         let Input { hole, filling, reference } = input;
+        let seat = seat.map(|Seat { face, lambda }| (rank(cells, face), lambda));
         let positions = &reference.quantized.positions;
         self.step = 0.0;
         self.placement.start(filling.tets.len());
@@ -163,13 +168,16 @@ impl FillCost {
             }
             placement.raise(chords(filling, reference));
         }
-        let placement = &mut self.placement;
+        let Self { placement, hints, .. } = self;
         let mut error = largest(&placement.errors);
-        let mut hint = 0;
+        hints.clear();
+        hints.extend((0..hole.star.len()).map(|tet| first_hint(hole, cells, tet)));
         hole_cost.gather(hole, buckets);
         for i in 0..hole_cost.points.len() {
-            let (own, cell) = placement.place(hole_cost.points[i], hint, &input);
-            hint = cell;
+            let (point, tet) = hole_cost.points[i];
+            let hint = &mut hints[usize::from(tet)];
+            let own;
+            (own, *hint) = placement.place(point, *hint, &input);
             error = error.max(own);
             if error > limit {
                 hole_cost.points.swap(0, i);
@@ -225,6 +233,14 @@ impl FillCost {
         }
         largest
     }
+}
+
+/// What was between a face and the vertex is mostly between it and the neighbour that the vertex is moved to; what was at the edge between
+/// both, beside it.
+fn first_hint(hole: &Hole, cells: FaceSet, tet: usize) -> usize {
+    let own = 1 << tet;
+    let likely = if cells & own != 0 { own } else { hole.faces_beside(tet) & cells };
+    if likely == 0 { 0 } else { rank(cells, likely.trailing_zeros() as usize) }
 }
 
 /// The reference vertices of the boundary at a hole.

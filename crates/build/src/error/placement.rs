@@ -101,7 +101,8 @@ impl Placement {
     fn try_cell(&mut self, i: usize, position: DVec3, new: &impl Replacement) -> (usize, DVec3, f64) {
         let Cell { barycentric, origin } = self.cell(i, new);
         let lambda = *barycentric * (position - *origin);
-        (i, lambda, lambda.min_element().min(1.0 - lambda.element_sum()))
+        let (least, own) = (lambda.min_element(), 1.0 - lambda.element_sum());
+        (i, lambda, if least < own { least } else { own })
     }
 
     #[inline]

@@ -43,6 +43,22 @@ impl Lists {
         let step = |p: u32| (p != NONE).then_some(p);
         std::iter::successors(step(self.first[t as usize]), move |&p| step(self.next[p as usize]))
     }
+
+    /// Writes the points of all of these tetrahedra, each with its tetrahedron's place among them, to `points`: first the first one of
+    /// each list, then the second ones. So the memory delivers several at a time.
+    pub fn gather(&self, tets: impl Iterator<Item = u32>, points: &mut Vec<(u32, u8)>) {
+        points.clear();
+        points.extend(tets.zip(0..).map(|(t, place)| (self.first[t as usize], place)));
+        points.retain(|&(p, _)| p != NONE);
+        let mut at = 0;
+        while let Some(&(p, place)) = points.get(at) {
+            let next = self.next[p as usize];
+            if next != NONE {
+                points.push((next, place));
+            }
+            at += 1;
+        }
+    }
 }
 
 /// Lists of points of which few tetrahedra have any: those without take no memory.
