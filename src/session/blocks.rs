@@ -51,8 +51,12 @@ pub enum BlockState {
     InUse,
 }
 
-/// How many bytes are asked for at first: as a rule more than stands in front of the blocks of a small file.
+/// How many bytes are asked for at first: as a rule more than stands in front of the blocks of a small file. Multiples of it are, until the
+/// index says where the blocks begin.
 const FIRST_BYTES: u64 = 1 << 16;
+
+/// How many bytes in front of the blocks are asked for at a time at most: a multiple of [`FIRST_BYTES`]. A file may claim any length.
+const MAX_HEAD_BYTES: u64 = 16 << 20;
 
 /// How many bytes are asked for at a time where the file has to be read from end to end.
 const LATER_BYTES: u64 = 1 << 20;
@@ -102,9 +106,12 @@ impl Session {
     /// # }
     /// ```
     pub fn bytes_by_error(&self, place: usize) -> Vec<ErrorBytes> {
-        let shared = self.decoder.index().map_or(0, |index| index.shared);
-        let index_end = self.decoder.head_end().unwrap_or(0).saturating_sub(shared);
-        self.decoder.bytes_by_error(place, index_end.next_multiple_of(FIRST_BYTES))
+        self.decoder.bytes_by_error(place, self.bytes_to_index())
+    }
+
+    /// How many bytes are asked for before the index says where the blocks begin.
+    fn bytes_to_index(&self) -> u64 {
+        self.decoder.bytes_to_index().next_multiple_of(FIRST_BYTES)
     }
 
     /// Up to where the file is still to be read in order; none when that is done.
@@ -114,11 +121,8 @@ impl Session {
         if !is_paged {
             return (!self.decoder.progress().complete).then_some(fed + LATER_BYTES);
         }
-        match self.decoder.head_end() {
-            Some(end) if fed >= end => None,
-            Some(end) => Some(end),
-            None => Some(fed + FIRST_BYTES),
-        }
+        let end = self.decoder.stated_head_end().unwrap_or_else(|| self.bytes_to_index());
+        (fed < end).then(|| end.min(fed + MAX_HEAD_BYTES))
     }
 
     /// Whether more is to come of the file, if all goes well: anything that the request needs, or the rest of a file that comes

@@ -1,11 +1,11 @@
 //! Promise: whatever a file with good checksums holds, a session gives valid meshes or typed errors, and ends.
 
-use crate::support::files::{assemble, overwrite, sections};
+use crate::support::files::{assemble, bytes_of, half_edge, header, overwrite, section, sections};
 use crate::support::requests::requests;
 use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::sync::LazyLock;
-use tetralod::format::{EncodeOptions, encode};
+use tetralod::format::{DecodeOptions, EncodeOptions, FormatError, encode};
 use tetralod::mt::{MtKind, MultiTessellation};
 use tetralod::session::{Session, SessionError};
 use tetralod_build::{BuildConfig, build};
@@ -48,6 +48,57 @@ fn the_files_themselves_are_sound() {
         assert!(*updates > 400 && exercise(bytes));
         assert_eq!(&assemble(&sections(bytes), *updates), bytes);
     }
+}
+
+/// The beginning of a section that claims to have so many bytes.
+fn begun(kind: &[u8; 4], length: u32, content: &[u8]) -> Vec<u8> {
+    [kind.as_slice(), &length.to_le_bytes(), &[0; 4], content].concat()
+}
+
+/// What a session in parts asks for does not grow with what a file claims, checked or not.
+#[test]
+fn claimed_lengths_are_asked_for_in_pieces() {
+    let good = sections(&bytes_of(&half_edge(2, 1, 600)));
+    let [(b"INFO", info), (b"INDX", index)] = [0, 1].map(|i| (&good[i].0, &good[i].1)) else {
+        panic!("description and index come first");
+    };
+    // The number behind the first byte says what the blocks share.
+    let old = 1 + index[1..].iter().position(|&byte| byte < 0x80).expect("the end of a number") + 1;
+    let shares = |number: &[u8]| [&index[..1], number, &index[old..]].concat();
+    let most = shares(&[0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x40]);
+    let too_much = shares(&[0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1]);
+    let length = index.len() as u32 + 100;
+    let cases = [
+        ("much to skip", begun(b"xtra", u32::MAX, &[1; 100])),
+        ("much to skip, of which nothing is here", begun(b"xtra", u32::MAX, &[])),
+        ("an index of 256 MiB", begun(b"INDX", 256 << 20, index)),
+        ("an index of which too little is here", begun(b"INDX", 256 << 20, &most[..4])),
+        ("2^48 bytes behind the index", begun(b"INDX", length, &most)),
+        ("the same, as good as checked", section(b"INDX", &most)),
+        ("2^64 bytes behind the index", begun(b"INDX", length, &too_much)),
+        ("blocks of no size", begun(b"INDX", length, &[0xFF; 20])),
+    ];
+    let opened = |bytes: &[u8]| {
+        let mut session = Session::in_parts(DecodeOptions::default(), u64::MAX);
+        session.take(&(0..1 << 16), bytes).map(|()| session)
+    };
+    let before = [header(2, 0, 0), section(b"INFO", info)].concat();
+    for (what, claim) in cases {
+        let bytes = [&before[..], &claim].concat();
+        let mut session = opened(&bytes).expect("not enough to be wrong");
+        let wanted = session.wanted();
+        let range = &wanted[0].range;
+        assert!(wanted.len() == 1 && range.start == bytes.len() as u64, "{what}: {wanted:?}");
+        assert!(range.end > range.start && range.end - range.start <= 16 << 20, "{what}: {wanted:?}");
+        let ended = session.take(range, &[]);
+        assert_eq!(ended, Err(FormatError::Truncated { offset: range.start }), "{what}");
+    }
+    for length in [(256 << 20) + 1, u32::MAX] {
+        let found = opened(&[&before[..], &begun(b"INDX", length, index)].concat()).map(|_| ());
+        assert!(matches!(found, Err(FormatError::Limit { .. })), "{found:?}");
+    }
+    let found = opened(&[&before[..], &section(b"INDX", &too_much)].concat()).map(|_| ());
+    assert!(matches!(found, Err(FormatError::Corrupt { .. })), "{found:?}");
 }
 
 proptest! {

@@ -7,7 +7,8 @@ use crate::support::random::Random;
 use std::sync::{Arc, LazyLock};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::{Bounds, Camera};
-use tetralod::mesh::TetMesh;
+use tetralod::mesh::{Field, TetMesh};
+use tetralod::mt::Mt;
 use tetralod::refine::{Criterion, Custom, Inside, Need, Region, Request, TetData, Transfer, View};
 use tetralod::session::Session;
 use tetralod::stream::LoaderOptions;
@@ -17,11 +18,10 @@ use tetralod_io::generate;
 const NETWORK: Network = Network { latency_ms: 40.0, bytes_per_ms: 2500.0, protocol: Protocol::Http1 };
 const NETWORKS: [Network; 2] = [NETWORK, Network { protocol: Protocol::Http2, ..NETWORK }];
 
-/// A half-edge file in many blocks.
-fn file(mesh: &TetMesh) -> Vec<u8> {
+/// A half-edge MT in many blocks.
+fn many_blocks(mesh: &TetMesh) -> Mt {
     let config = BuildConfig { block_bits: 4, all_fields: true, ..BuildConfig::default() };
-    let mt = build(mesh, &config).expect("a valid mesh").mt;
-    encode(&mt, &EncodeOptions::default()).expect("a sound MT")
+    build(mesh, &config).expect("a valid mesh").mt
 }
 
 /// Files that are several times as large as what a session asks for at first, with names.
@@ -32,7 +32,9 @@ static FILES: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
         field.values.iter_mut().for_each(|x| *x += 0.1 * random.fraction());
     }
     let bucky = generate::bucky(27).expect("a size that is allowed");
-    let files = [("bucky", bucky), ("bent", bent(25)), ("ell", ell)].map(|(name, mesh)| (name, file(&mesh)));
+    let files = [("bucky", bucky), ("bent", bent(25)), ("ell", ell)].map(|(name, mesh)| {
+        (name, encode(&many_blocks(&mesh), &EncodeOptions::default()).expect("a sound MT"))
+    });
     for (name, file) in &files {
         assert!(file.len() > 130_000, "{name}: {}", file.len());
     }
@@ -100,6 +102,49 @@ fn one_look_at_the_index_gives_all_that_a_request_needs() {
                 assert!(cost.rounds <= 1 && cost.repeated == 0, "{case}");
             }
         }
+    }
+}
+
+/// Opening takes a round for what shows where the blocks begin and one for the rest up to there, as exactly as the curve states it.
+#[test]
+fn a_long_index_takes_no_more_rounds_than_a_short_one() {
+    let mut mesh = generate::bucky(27).expect("a size that is allowed");
+    let mut random = Random::new(5);
+    for number in 0..24 {
+        let values = mesh.positions.iter().map(|p| p[number % 3] + 0.1 * random.fraction()).collect();
+        mesh.fields.push(Field::new(format!("field {number}"), values));
+    }
+    let mt = many_blocks(&mesh);
+    let long_index = EncodeOptions::default();
+    let notes = |count| (0..count).map(|note: u32| (note.to_string(), "a".repeat(60_000))).collect();
+    let long_both = EncodeOptions { metadata: notes(3), ..EncodeOptions::default() };
+    // The index begins at the end of what is asked for at first.
+    let late_index = EncodeOptions { metadata: notes(1), ..EncodeOptions::default() };
+    for (options, most_rounds) in [(long_index, 2), (late_index, 2), (long_both, 3)] {
+        let file = encode(&mt, &options).expect("a sound MT");
+        let mut whole = Session::new();
+        whole.feed(&file).expect("a sound file");
+        let head_end = whole.decoder().head_end().expect("an index");
+        assert!(head_end > 2 << 16, "{head_end}");
+        let curve = whole.bytes_by_error(0);
+        for (network, point) in
+            NETWORKS.into_iter().flat_map(|network| [(network, 0), (network, curve.len() / 2)])
+        {
+            let mut visitor =
+                Visitor::new(&file, network, LoaderOptions { gap: Some(0), ..LoaderOptions::default() });
+            let opened = visitor.open();
+            assert!(opened.rounds <= most_rounds && opened.repeated == 0, "{opened:?}");
+            assert_eq!(opened.bytes, head_end);
+            assert_eq!(visitor.session.bytes_by_error(0), curve);
+            let request = Need::within(curve[point].error).of_field(0).into();
+            let cost = visitor.refine(&request).expect("a sensible request");
+            assert!(cost.rounds <= 1 && cost.repeated == 0, "{cost:?}");
+            assert_eq!(opened.bytes + cost.bytes, curve[point].bytes);
+        }
+        let (_, a_box) = requests(&whole).swap_remove(2);
+        let mut visitor = Visitor::new(&file, NETWORK, LoaderOptions::default());
+        let rounds = visitor.open().rounds + visitor.refine(&a_box).expect("a sensible request").rounds;
+        assert!(rounds <= most_rounds + 1, "{rounds}");
     }
 }
 

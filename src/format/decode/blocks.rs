@@ -3,7 +3,7 @@
 use super::{Decoder, ExactStatus, Stage};
 use crate::format::header::{END_BYTES, HEAD_BYTES, Kind, SectionHead};
 use crate::format::read::Reader;
-use crate::format::{BlockInfo, FormatError};
+use crate::format::{BlockInfo, FormatError, Index};
 use crate::mt::{PageError, UpdatePages};
 use std::ops::Range;
 
@@ -50,7 +50,29 @@ impl Decoder {
     /// Where the blocks begin in the file, or a byte behind where less is known; none before the index is there.
     pub fn head_end(&self) -> Option<u64> {
         let index = self.head.index.as_ref()?;
-        self.head.index_end.checked_add(index.shared)
+        self.head.index_at.end.checked_add(index.shared)
+    }
+
+    /// As [`Decoder::head_end`], but as soon as the index begins, as that states it: nothing has verified it then.
+    pub(crate) fn stated_head_end(&self) -> Option<u64> {
+        match &self.stage {
+            Stage::Payload { head, start, left, .. } if head.kind == Kind::INDX => {
+                // What is wrong with it shows when all of it is there.
+                let stated = Index::read_start(&mut Reader::new(&self.buffer, *start));
+                (self.bytes + u64::from(*left)).checked_add(stated.map_or(0, |(_, shared)| shared))
+            }
+            _ => self.head_end(),
+        }
+    }
+
+    /// How many bytes of the file show where its blocks begin; where the index is not there, if it is the next section.
+    pub(crate) fn bytes_to_index(&self) -> u64 {
+        let next = match &self.stage {
+            _ if self.head.index.is_some() => self.head.index_at.start,
+            Stage::Payload { left, .. } => self.bytes + u64::from(*left),
+            _ => self.bytes - self.buffer.len() as u64,
+        };
+        next + HEAD_BYTES as u64 + Index::START_BYTES
     }
 
     /// The bytes of the file behind the blocks of a half-edge MT, where exact values are; none if there are none, or that is not known yet.

@@ -9,6 +9,7 @@ use crate::format::payload::{BaseParts, half_edge};
 use crate::format::read::Reader;
 use crate::format::{FormatError, Index};
 use crate::mt::{ErrorCode, Mt, MtInfo, UpdatePages};
+use std::ops::Range;
 
 /// What comes in front of the blocks.
 #[derive(Debug, Default)]
@@ -19,8 +20,8 @@ pub(super) struct FileHead {
     pub(super) wanted: Vec<usize>,
     /// In files of half-edge MTs.
     pub(super) index: Option<Index>,
-    /// Where the index ends in the file.
-    pub(super) index_end: u64,
+    /// Where that is in the file.
+    pub(super) index_at: Range<u64>,
     pub(super) histograms: Option<Histograms>,
     pub(super) models: Option<Models>,
     /// Until all wanted fields are there; then it is in the MT.

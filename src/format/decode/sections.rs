@@ -87,8 +87,9 @@ impl Decoder {
         if !info.kind.is_paged() {
             return Err(content.out_of_place());
         }
+        let start = self.bytes - (HEAD_BYTES + content.len()) as u64;
         *index = Some(Index::read(content, info)?);
-        self.head.index_end = self.bytes;
+        self.head.index_at = start..self.bytes;
         Ok(())
     }
 

@@ -94,13 +94,22 @@ impl Index {
         }
     }
 
-    /// Reads the index of an MT.
-    pub fn read(mut reader: Reader<'_>, info: &MtInfo) -> Result<Self, FormatError> {
-        let block_bits = read_block_bits(&mut reader)?;
+    /// Bytes that [`Index::read_start`] reads at most.
+    pub const START_BYTES: u64 = 11;
+
+    /// Reads what comes in front of the number of blocks: `block_bits` and `shared`.
+    pub fn read_start(reader: &mut Reader<'_>) -> Result<(u32, u64), FormatError> {
+        let block_bits = read_block_bits(reader)?;
         let shared = reader.varint64()?;
         if shared > MAX_SHARED {
             return Err(reader.corrupt("what the blocks share is longer than sections can be"));
         }
+        Ok((block_bits, shared))
+    }
+
+    /// Reads the index of an MT.
+    pub fn read(mut reader: Reader<'_>, info: &MtInfo) -> Result<Self, FormatError> {
+        let (block_bits, shared) = Self::read_start(&mut reader)?;
         let count = reader.varint()?;
         if u64::from(count) != u64::from(info.updates).div_ceil(1 << block_bits) {
             return Err(reader.corrupt("the index does not have as many blocks as there are updates for"));
