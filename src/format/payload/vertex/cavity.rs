@@ -3,7 +3,7 @@
 use super::state::{State, View};
 use crate::geom::{insphere, views_of_origin};
 use crate::mesh::{FACES, NONE};
-use crate::mt::MAX_REMOVED;
+use crate::mt::{MAX_REMOVED, corner_of};
 
 /// One bit for each.
 #[inline]
@@ -43,10 +43,14 @@ impl State {
         while let Some(&t) = self.removed.get(next).filter(|_| self.removed.len() <= MAX_REMOVED) {
             let view = self.views[next];
             next += 1;
-            let around = self.mesh.neighbors()[t as usize];
-            for k in by_vertex(self.mesh.tets()[t as usize]) {
+            let (tet, around) = (self.mesh.tets()[t as usize], self.mesh.neighbors()[t as usize]);
+            for k in by_vertex(tet) {
                 let n = around[k];
                 self.on_boundary |= n == NONE;
+                // What lies opposite the vertex that all have does not have it.
+                if fan == Some(tet[k]) {
+                    continue;
+                }
                 let mark = self.tet_marks.get(n as usize).copied().unwrap_or(no);
                 if (yes..=never).contains(&mark) {
                     continue;
@@ -72,7 +76,7 @@ impl State {
     #[inline]
     pub(super) fn view_if(&self, t: u32, fan: Option<u32>, position: [i32; 3]) -> Option<View> {
         let Some(fan) = fan else { return Some(self.view(t, position)) };
-        let corner = self.mesh.tets()[t as usize].iter().position(|&v| v == fan)?;
+        let corner = corner_of(&self.mesh.tets()[t as usize], fan);
         let view = self.view(t, position);
         let is_open = self.mesh.neighbors()[t as usize][corner] == NONE || view.seen >> corner & 1 == 1;
         is_open.then_some(view)

@@ -221,8 +221,14 @@ impl State {
         cone.clear();
         if self.narrow {
             self.turn_link(near, position);
-            let ahead = self.star.iter().zip(&self.corners).filter(|(_, corners)| self.is_ahead(**corners));
-            cone.extend(ahead.map(|(&t, _)| t));
+            // Which are is a coin toss for the processor: all are written, and counted if they are.
+            cone.resize(self.star.len(), NONE);
+            let mut len = 0;
+            for (&t, &corners) in self.star.iter().zip(&self.corners) {
+                cone[len] = t;
+                len += usize::from(self.is_ahead(corners));
+            }
+            cone.truncate(len);
         } else {
             cone.extend(self.star.iter().copied().filter(|&t| {
                 let tet = self.mesh.tets()[t as usize];
@@ -254,7 +260,7 @@ impl State {
             let (u, v) = (self.link[i as usize], self.turned[j as usize]);
             u[0] * v[0] + u[1] * v[1] + u[2] * v[2] >= 0
         };
-        is_inside(a, b) && is_inside(b, c) && is_inside(c, a)
+        is_inside(a, b) & is_inside(b, c) & is_inside(c, a)
     }
 
     pub(super) fn sort_star(&mut self) {
@@ -265,6 +271,9 @@ impl State {
 
     /// Sorts tetrahedra by their sorted vertices.
     fn sort(&self, tets: &mut [u32]) {
+        if tets.len() < 2 {
+            return;
+        }
         let mut sorted: Vec<([u32; 4], u32)> = tets.iter().map(|&t| (self.sorted(t), t)).collect();
         sorted.sort_unstable();
         tets.iter_mut().zip(sorted).for_each(|(t, (_, sorted))| *t = sorted);
