@@ -1,19 +1,21 @@
 // A viewer without a GPU, for tests of the page's own code: it has one small volume, and does at once what it is asked for.
-const component = (name, number) => ({ name, unit: "m/s", min: -1, max: 1, time: number, vector: { name: "velocity", component: "xyz".indexOf(name.at(-1)) } });
+const component = (name, number) => ({ name, unit: "m/s", min: -1, max: 1, isovalue: 0, time: number, vector: { name: "velocity", component: "xyz".indexOf(name.at(-1)) } });
 const FIELDS = [0, 1, 2].flatMap((time) => [
-  { name: "pressure", unit: "Pa", min: 1 + time, max: 10 + time, time },
+  { name: "pressure", unit: "Pa", min: 1 + time, max: 10 + time, isovalue: 6.5, time },
   ...["velocity_x", "velocity_y", "velocity_z"].map((name) => component(name, time)),
 ]);
 
 const VOLUMES = {
-  flow: { kind: "half-edge", vertices: 1000, tetrahedra: 5000, updates: 900, bounds: [0, 0, 0, 2, 4, 8], fields: FIELDS },
+  flow: { kind: "half-edge", vertices: 1000, tetrahedra: 5000, updates: 900, isBox: true, firstField: 0, bounds: [0, 0, 0, 2, 4, 8], fields: FIELDS },
   plain: {
     kind: "explicit",
     vertices: 300,
     tetrahedra: 1000,
     updates: 200,
+    isBox: true,
+    firstField: 0,
     bounds: [-1, -1, -1, 1, 1, 1],
-    fields: [{ name: "density", unit: "", min: -2, max: 6, time: undefined }],
+    fields: [{ name: "density", unit: "", min: -2, max: 6, isovalue: 2, time: undefined }],
   },
 };
 
