@@ -61,7 +61,9 @@ const firstCut = () => (firstView() === "solid" ? (loaded.flip ? 0 : 1000) : MID
 /** Parts that have an opacity, in the order that links have. */
 const SHEER = ["iso", "volume", "slice", "solid"];
 /** Parts whose edges can be drawn, and whether they are drawn first. @type {Record<string, boolean>} */
-const EDGES = { iso: false, slice: true, solid: false, mesh: true };
+const EDGES = { iso: false, slice: true, solid: true, mesh: true };
+/** Edges are not drawn on a boundary that is shown first. @returns {Record<string, boolean>} */
+const firstEdges = () => ({ ...EDGES, solid: firstView() !== "solid" });
 const OPAQUE = 100;
 /** Of planes, in thousandths of the model's length. */
 export const MIDDLE = 500;
@@ -215,10 +217,10 @@ const ENTRIES = {
   },
   edges: {
     // The parts that are not as first.
-    get: ({ edges }) => String(Object.keys(EDGES).filter((name) => edges[name] !== EDGES[name])),
+    get: ({ edges }) => String(Object.keys(EDGES).filter((name) => edges[name] !== firstEdges()[name])),
     set(words, draft) {
       const others = words.split(",");
-      draft.edges = Object.fromEntries(Object.entries(EDGES).map(([name, first]) => [name, first !== others.includes(name)]));
+      draft.edges = Object.fromEntries(Object.entries(firstEdges()).map(([name, first]) => [name, first !== others.includes(name)]));
       return true;
     },
   },
@@ -336,7 +338,7 @@ export const store = new Store(
 /** What there is first of the volume that is open. What is not in the address stays. @returns {State} */
 function first() {
   const { freeze, difference, split } = store.state;
-  const own = { view: firstView(), places: { ...FIRST.places, cut: firstCut() }, field: firstFields()[0], vector: vectorNames()[0], box: inner() };
+  const own = { view: firstView(), places: { ...FIRST.places, cut: firstCut() }, edges: firstEdges(), field: firstFields()[0], vector: vectorNames()[0], box: inner() };
   return { ...store.state, ...loaded, ...FIRST, ...own, freeze, difference, split };
 }
 
