@@ -120,7 +120,7 @@ export interface MtInfo {
    */
   firstField: number;
   /**
-   * Whether the domain is the box around it, but for a thousandth of its volume: as that of a grid. Then its boundary shows little, and
+   * Whether the domain fills the box around it, but for a fiftieth of its volume: as that of a grid. Then its boundary shows little, and
    * an isosurface is drawn first.
    */
   isBox: boolean;
