@@ -62,7 +62,9 @@ fn each_mode_is_a_picture_of_its_own_and_the_same_each_time() {
     let (_folder, mt, out) = prepared("modes", 9);
     let empty = draw(&mt, &out, &["--isovalue", "99"]);
     let mut drawn: Vec<Picture> = Vec::new();
-    for mode in ["isosurface", "volume", "slice", "boundary", "cells", "wire", "points", "isosurface,slice,wire"] {
+    for mode in
+        ["isosurface", "volume", "slice", "boundary", "cells", "wire", "points", "isosurface,slice,wire"]
+    {
         let picture = draw(&mt, &out, &["--mode", mode]);
         assert_eq!((picture.size, picture.channels), ([120, 90], 3), "{mode}");
         assert!(picture.differing(&empty) > 300, "{mode} is blank");
