@@ -80,14 +80,16 @@ const NUMBERS_AND_PLACES: [&str; 23] = [
 /// Whether the name of an array says that it numbers something, or where it is: that is seldom what is to be looked at. Words of names end at
 /// signs, and where a large letter follows a small one.
 pub fn is_number_or_place(name: &str) -> bool {
+    // The words are English: of other letters it is enough that they are some.
+    let is_letter = |c: char| c.is_ascii_alphabetic() || !c.is_ascii();
     let mut words = vec![String::new()];
     let mut before = ' ';
     for c in name.chars() {
-        if !c.is_alphabetic() || (before.is_lowercase() && c.is_uppercase()) {
+        if !is_letter(c) || (before.is_ascii_lowercase() && c.is_ascii_uppercase()) {
             words.push(String::new());
         }
-        if let Some(word) = words.last_mut().filter(|_| c.is_alphabetic()) {
-            word.extend(c.to_lowercase());
+        if let Some(word) = words.last_mut().filter(|_| is_letter(c)) {
+            word.push(c.to_ascii_lowercase());
         }
         before = c;
     }

@@ -27,7 +27,7 @@ const LIMITS = {
   "./worker": 10_800,
   "./viewer-worker": 20_000,
   "./build-worker": 5_500,
-  "./core.wasm": 292_000,
+  "./core.wasm": 293_500,
   "./viewer.wasm": 450_000,
   "./build.wasm": 560_000,
 };
