@@ -338,7 +338,14 @@ export const store = new Store(
 /** What there is first of the volume that is open. What is not in the address stays. @returns {State} */
 function first() {
   const { freeze, difference, split } = store.state;
-  const own = { view: firstView(), places: { ...FIRST.places, cut: firstCut() }, edges: firstEdges(), field: firstFields()[0], vector: vectorNames()[0], box: inner() };
+  const own = {
+    view: firstView(),
+    places: { ...FIRST.places, cut: firstCut() },
+    edges: firstEdges(),
+    field: firstFields()[0],
+    vector: vectorNames()[0],
+    box: inner(),
+  };
   return { ...store.state, ...loaded, ...FIRST, ...own, freeze, difference, split };
 }
 

@@ -1,5 +1,13 @@
 // A viewer without a GPU, for tests of the page's own code: it has one small volume, and does at once what it is asked for.
-const component = (name, number) => ({ name, unit: "m/s", min: -1, max: 1, isovalue: 0, time: number, vector: { name: "velocity", component: "xyz".indexOf(name.at(-1)) } });
+const component = (name, number) => ({
+  name,
+  unit: "m/s",
+  min: -1,
+  max: 1,
+  isovalue: 0,
+  time: number,
+  vector: { name: "velocity", component: "xyz".indexOf(name.at(-1)) },
+});
 const FIELDS = [0, 1, 2].flatMap((time) => [
   { name: "pressure", unit: "Pa", min: 1 + time, max: 10 + time, isovalue: 6.5, time },
   ...["velocity_x", "velocity_y", "velocity_z"].map((name) => component(name, time)),
