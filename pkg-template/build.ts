@@ -15,6 +15,7 @@
 
 import type { BuildMethods, Step } from "./build-worker.js";
 import { type ErrorCode, TetralodError, badOption, known } from "./errors.js";
+import type { Averaged, Extremes } from "./results.js";
 import { type Kind, absoluteHref, checkWorker, startWorker } from "./start.js";
 import { nodeModule } from "./stream.js";
 
@@ -92,7 +93,7 @@ export interface InputField {
   at: "points" | "cells";
   /** Empty if it is not known. */
   unit: string;
-  /** The vector that it is a part of: which component, or its length without one. `undefined` for a scalar. */
+  /** The vector that it is a part of: which component, or without one what follows from these, as its length. `undefined` for a scalar. */
   vector: { name: string; component: number | undefined } | undefined;
 }
 
@@ -124,11 +125,11 @@ export interface CoreBuildOptions {
   purpose?: "uniform" | "regions";
   /** Whether tetrahedra have errors of their own, with method insert. */
   tetErrors?: boolean;
-  /** Names of the fields to keep, in this order; a vector's name for its components. Default: the first that does not number something or say where it is, by its name. */
+  /** Names of the fields to keep, in this order; a vector's name for its components. Default: the first array that does not number something or say where it is, by its name; of a vector the magnitude, of a symmetric tensor von Mises' equivalent. */
   fields?: readonly string[];
-  /** Whether to keep all fields but the lengths of vectors. */
+  /** Whether to keep all fields but what follows from others: magnitudes of vectors, von Mises' equivalent and principal values of symmetric tensors. */
   allFields?: boolean;
-  /** Whether fields at cells become fields at points: the mean of the cells around, weighted by volume. */
+  /** Whether fields at cells become fields at points: the mean of the cells around, weighted by volume. `averaged` of the report says what that does to them. */
   cellToPoint?: boolean;
   /**
    * What is repaired: nothing (a mesh that needs it is refused), what has only one sensible repair, or also points that lie on each other,
@@ -159,6 +160,13 @@ export interface CoreBuildOptions {
   minDihedral?: number;
   /** Creases and corners where flat parts of the boundary meet at so many degrees or more stay, 1 to 90. Default: 60. */
   featureAngle?: number;
+  /**
+   * Labels that part the mesh into regions: names of whole numbers at cells or points, which are kept apart in all meshes, or `"components"`, the
+   * parts that hang together by faces. Half-edge files keep the regions (`info.regions`).
+   */
+  preserve?: readonly string[];
+  /** How far curved interfaces between regions may move, in model units. Default: 0. */
+  preserveWithin?: number;
   /** Updates in a block: a power of two from 16 to 65536. */
   blockUpdates?: number;
 }
@@ -220,6 +228,18 @@ export interface CoreBuildReport {
   repair: RepairReport | undefined;
   /** What the reader left out of the files or changed, in words. */
   notes: string[];
+  /** What averaging has done to the fields that the files have at cells (`cellToPoint`). */
+  averaged: AveragedField[];
+}
+
+/** A field that was averaged from cells to points. */
+export interface AveragedField extends Averaged {
+  name: string;
+  /** `undefined` if it is not known. */
+  unit?: string;
+  time?: number;
+  /** The smallest and the largest value at points, and where they are. */
+  points: Extremes;
 }
 
 const KINDS = "give a File, Blob, ArrayBuffer, Uint8Array, URL, { raw, json }, or a list of these for time steps";

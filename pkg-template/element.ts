@@ -63,6 +63,9 @@ export interface TetralodViewerElement {
    */
   get error(): string | null;
   set error(error: string | number | null);
+  /** The name of a vector that displaces what is drawn, and how many times if that is not left to the viewer, as in `u 20`. */
+  get deform(): string | null;
+  set deform(vector: string | null);
   /** The largest number of tetrahedra. Default: no limit. */
   get maxTets(): string | null;
   set maxTets(most: number | string | null);
@@ -91,6 +94,7 @@ const ATTRIBUTES = {
   "isovalue": "isovalue",
   "field": "field",
   "error": "error",
+  "deform": "deform",
   "max-tets": "maxTets",
   "map": "map",
   "background": "background",
@@ -338,9 +342,16 @@ export class TetralodViewerElement extends Base {
     return {
       ...(mode ? { ...NOTHING, ...MODES[mode]({ values: this.#values, middle }) } : UNNAMED),
       colours: map === null ? null : { map },
+      deform: this.#deform,
       background: background as SceneState["background"] | null,
       ...this.#state,
     };
+  }
+
+  get #deform(): SceneState["deform"] | null {
+    // Names may have spaces, too.
+    const [, field, factor] = /^(.*?)(?:\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?))?$/i.exec(this.getAttribute("deform")?.trim() ?? "") ?? [];
+    return field ? { field, ...(factor ? { factor: Number(factor) } : {}) } : null;
   }
 
   /** Which mesh is drawn: without `error`, one that is right within a pixel. */

@@ -2,7 +2,7 @@
 
 import { badOption } from "./errors.js";
 import type { FieldInfo } from "./results.js";
-import type { ArrowState, ViewerChanges, Misfit, PlaneState, SceneState, StreamlineState } from "./scene.js";
+import type { ArrowState, ViewerChanges, Misfit, PlaneState, SceneState, StreamlineState, ThresholdState } from "./scene.js";
 
 /** Lengths that are drawn with are between these parts of the box's diagonal. */
 const LEAST = 1e-5;
@@ -13,11 +13,12 @@ const LISTS = ["isosurfaces", "slices"] as const;
 const FLOWS = ["streamlines", "arrows"] as const;
 
 /** What is asked of a field. */
-type Field = Pick<FieldInfo, "name" | "min" | "max">;
+type Field = Pick<FieldInfo, "name" | "min" | "max"> & Partial<Pick<FieldInfo, "vector">>;
 
 /** What is asked of a volume. */
 export interface Volume {
   isBox: boolean;
+  regions?: { all: { name: string; labels: number[] }[] } | undefined;
   fields: Field[];
   bounds: number[];
 }
@@ -41,13 +42,31 @@ export function changedScene<S extends SceneState>(scene: S, changes: ViewerChan
 
 const isKnown = (name: string, fields: Field[]) => fields.some((field) => field.name === name);
 
+/** What is wrong with a vector that displaces: nothing if the volume has it. */
+function noVector(vector: string, fields: Field[]): string | undefined {
+  const has = (axis: string, i: number) => fields.some(({ name, vector: part }) => (part?.name === vector && part.component === i) || name === `${vector}_${axis}`);
+  const listed = vector.split(",");
+  const isListed = listed.length === 3 && listed.every((name) => isKnown(name, fields));
+  return isListed || ["x", "y", "z"].every(has) ? undefined : `there is no vector ${JSON.stringify(vector)} of three components`;
+}
+
 function unknown(name: string, fields: Field[]): string {
   const names = [...new Set(fields.map((field) => field.name))].join(", ");
   return `there is no field ${JSON.stringify(name)}; this volume has: ${names}`;
 }
 
-/** Refuses a scene that names a field which the volume does not have. */
-export function checkFields(scene: SceneState, { fields }: Volume) {
+/** What is wrong with a list of regions: nothing if the volume has all of them. */
+function noRegion(names: (string | number)[], { regions }: Volume): string | undefined {
+  const all = regions?.all ?? [];
+  const labels = all.filter((one) => one.labels.length === 1).map((one) => String(one.labels[0]));
+  const called = new Set([...all.map((one) => one.name), ...labels]);
+  const missing = names.find((name) => !called.has(String(name)));
+  return missing === undefined ? undefined : `there is no region ${JSON.stringify(missing)}`;
+}
+
+/** Refuses a scene that names a field or a region which the volume does not have. */
+export function checkNames(scene: SceneState, volume: Volume) {
+  const { fields } = volume;
   const named: [string, string | undefined][] = LISTS.flatMap((list) =>
     [...(scene[list] ?? [])].map(({ field }, i): [string, string | undefined] => [`${list}[${i}].field`, field]),
   );
@@ -56,9 +75,14 @@ export function checkFields(scene: SceneState, { fields }: Volume) {
     if (!flow) continue;
     named.push(...(flow.fields ?? []).map((name): [string, string] => [`${part}.fields`, name]), [`${part}.field`, flow.field]);
   }
+  named.push(["threshold.field", scene.threshold?.field]);
   for (const [place, name] of named) {
     if (typeof name === "string" && !isKnown(name, fields)) throw badOption(place, unknown(name, fields));
   }
+  const problem = scene.deform && noVector(scene.deform.field, fields);
+  if (problem) throw badOption("deform.field", problem);
+  const region = scene.regions && noRegion(scene.regions, volume);
+  if (region) throw badOption("regions", region);
 }
 
 /** Says what does not fit of a value; nothing where it does. */
@@ -107,7 +131,10 @@ export function fitScene(scene: SceneState, volume: Volume): { scene: SceneState
   const overlaps = (box: ArrayLike<number>) => ([0, 1, 2].every((i) => box[i] <= bounds[i + 3] && box[i + 3] >= bounds[i]) ? undefined : outside);
   const isInside = (point: number[]) => point.every((x, i) => x >= bounds[i] && x <= bounds[i + 3]);
 
-  const fitted = only(scene, "", { clipBox: overlaps, region: overlaps });
+  const known = (names: (string | number)[]) => noRegion(names, volume);
+  const threshold: Judge = (one: ThresholdState) => (one.field && field(one.field)) || range(one.range);
+  const deform: Judge = ({ field }) => noVector(field, fields);
+  const fitted = only(scene, "", { clipBox: overlaps, region: overlaps, regions: known, deform, threshold });
   fitted.isosurfaces &&= fitted.isosurfaces.map((one, i) => only(one, `isosurfaces[${i}]`, { field, value }));
   fitted.slices &&= fitted.slices.map((one, i) => only(one, `slices[${i}]`, { field }));
   fitted.slices &&= fitted.slices.filter((slice, i) => keep(`slices[${i}]`, meets(slice)));

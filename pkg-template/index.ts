@@ -40,8 +40,11 @@ import {
   sendable,
 } from "./options.js";
 import type {
+  Averaged,
   BlockProgress,
   ErrorCurve,
+  Extreme,
+  Extremes,
   FieldInfo,
   FieldStats,
   FieldValues,
@@ -53,6 +56,8 @@ import type {
   MtInfo,
   Progress,
   RefineStats,
+  RegionInfo,
+  Regions,
   Slice,
   Stored,
   Streamline,
@@ -60,7 +65,7 @@ import type {
 } from "./results.js";
 import type { Answer, Args, NodeWorker, Remote } from "./rpc.js";
 import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
-import { type Absolute, absolute, fieldsOf } from "./stored.js";
+import { type Absolute, absolute, displaced, fieldsOf } from "./stored.js";
 import { type RangesSource, type Source, abortable, isRepeatable, openSource, pump, rangesOf } from "./stream.js";
 import type { SurfaceOptions } from "./surfaces.js";
 import { type AsideOptions, type AwaitOptions, type FieldOptions, type MeshTools, setCaller, withMeshTools } from "./tools.js";
@@ -68,10 +73,13 @@ import { type AsideOptions, type AwaitOptions, type FieldOptions, type MeshTools
 export type {
   Absolute,
   AsideOptions,
+  Averaged,
   AwaitOptions,
   BlockProgress,
   ErrorCode,
   ErrorCurve,
+  Extreme,
+  Extremes,
   FieldError,
   FieldInfo,
   FieldOptions,
@@ -91,6 +99,8 @@ export type {
   ReadOptions,
   RefineOptions,
   RefineStats,
+  RegionInfo,
+  Regions,
   Slice,
   Source,
   Stored,
@@ -103,7 +113,7 @@ export type {
   ViewOptions,
   Where,
 };
-export { TetralodError, absolute, applyChanges, emptyMesh };
+export { TetralodError, absolute, applyChanges, displaced, emptyMesh };
 
 export interface OpenOptions extends ReadOptions {
   /** Stops the download; pending calls reject with the signal's reason, by default an `AbortError`. */

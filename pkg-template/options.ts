@@ -60,6 +60,8 @@ export interface Need {
   isovalues?: ArrayLike<number>;
   /** Only tetrahedra whose values may meet one of these ranges, `[low, high]` in field units, count. */
   ranges?: ArrayLike<ArrayLike<number>> | ArrayLike<number>;
+  /** Only these regions of the volume count (`info.regions`), by their names or labels; others stay as coarse as they can be. */
+  regions?: readonly (string | number)[];
   /** What a camera sees. */
   view?: ViewOptions;
   /** What a transfer function shows. */

@@ -47,12 +47,48 @@ export interface FieldInfo {
    */
   histogram: Float64Array | null;
   /**
+   * The smallest and the largest value of the input at this time, and where the input has them: in the file's head, so it does not depend on the
+   * current mesh. `undefined` for files that do not say.
+   */
+  extremes: Extremes | undefined;
+  /** What averaging has done to a field that the input has at cells (`cellToPoint`); `undefined` for others. */
+  averaged: Averaged | undefined;
+  /**
    * The value whose isosurface is worth to be shown first, in field units, the same at all times: that which parts the histogram of the
    * first time into two groups of values that differ most (Otsu 1979); the middle of the range where there is no histogram.
    */
   isovalue: number;
   /** What a mesh of some error takes. */
   curve: ErrorCurve;
+}
+
+/** A value of a field, and where the input has it. */
+export interface Extreme {
+  /** In field units. */
+  value: number;
+  /** In model units, before the file's lattice has rounded it; of a value at a cell the centre of the cell's volume. */
+  place: [number, number, number];
+  /** Of a value at a cell: its number in the input, from 0. */
+  cell?: number | undefined;
+  /** The part of the input in which cells are numbered so, if it has several. */
+  part?: string | undefined;
+}
+
+/** The smallest and the largest value of a field. */
+export interface Extremes {
+  min: Extreme;
+  max: Extreme;
+}
+
+/** What averaging has done to a field at cells: a point has the mean of the cells around it, weighted by volume. */
+export interface Averaged {
+  /** The smallest and the largest value at cells. */
+  input: Extremes;
+  /**
+   * How far the field at points is from the values at cells, of each cell the mean over its volume less its value: the square root of the mean of
+   * the squares over the volume, and the largest.
+   */
+  difference: { rms: number; largest: number };
 }
 
 /**
@@ -109,6 +145,31 @@ export interface BlockProgress {
   missed: number;
 }
 
+/** A part of a volume that all meshes keep apart, such as a material. */
+export interface RegionInfo {
+  /** Its name in the input, or its labels as text. No two regions have the same. */
+  name: string;
+  /** The whole number that each of the arrays of {@link Regions} has in it. */
+  labels: number[];
+  /** Its tetrahedra in the reference mesh. */
+  tetrahedra: number;
+  /** Its volume there, in cubed model units. */
+  volume: number;
+  /** The box around it there: `[x0, y0, z0, x1, y1, z1]` in model units. */
+  bounds: number[];
+  /** `"#rrggbb"`: another than those of the regions that it touches. */
+  color: string;
+}
+
+/** The parts of a volume that all meshes keep apart. */
+export interface Regions {
+  /** The arrays of the input that tell them apart. */
+  arrays: string[];
+  /** How far interfaces between them are from those of the input in any mesh, in model units: 0 if they are the same sets of points. */
+  deviation: number;
+  all: RegionInfo[];
+}
+
 /** What is known of a volume as soon as it is open. */
 export interface MtInfo {
   /** The kind of Multi-Tessellation: what its updates are. */
@@ -124,6 +185,8 @@ export interface MtInfo {
    * an isosurface is drawn first.
    */
   isBox: boolean;
+  /** The parts that all meshes keep apart; `undefined` for files that were built without `--preserve`. */
+  regions: Regions | undefined;
   /**
    * The box around the reference mesh, which holds every mesh of the volume: `[x0, y0, z0, x1, y1, z1]` in model units. Of files that were
    * made before they stated it, it may be larger by a 256th of the lattice at each side.

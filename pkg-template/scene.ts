@@ -54,6 +54,8 @@ export interface BoundaryState {
   edges?: boolean;
   /** `"#rrggbb"`, in place of the colours of the values. */
   colour?: string;
+  /** What gives it its colours: the values of the field without it, or the regions (`info.regions`). */
+  colourBy?: "field" | "region";
   /** Whether clip planes cut it; they do without it. */
   clipped?: boolean;
 }
@@ -67,7 +69,7 @@ export interface CellState {
   /** Leaves out tetrahedra, as a whole, with their centroid on the side that `normal` points to. */
   cut?: PlaneState;
   /** What colours them; the field without it. */
-  colourBy?: "field" | "size" | "error" | "depth" | "block" | "missing";
+  colourBy?: "field" | "size" | "error" | "depth" | "block" | "missing" | "region";
   /** Whether edges are drawn; they are without it. */
   edges?: boolean;
   /** Width of wires and edges, in CSS pixels; points are four times as large. */
@@ -98,6 +100,21 @@ export interface ArrowState {
   constant?: boolean;
 }
 
+/**
+ * Everything is drawn where a vector displaces it. Places of the scene itself, of `pick` and of `reading` are those of the model as it is:
+ * what planes and boxes cut moves along.
+ */
+export interface DeformState {
+  /** The name of a vector of three components: that of `FieldInfo.vector`, that of fields that end in `_x`, `_y` and `_z`, or three fields with commas between. */
+  field: string;
+  /** How many times the vector. Without it nothing goes farther than a tenth of the domain's diagonal, in all meshes and at all times. */
+  factor?: number;
+  /** For what swings: how much of a period has passed. The displacement is that times the sine: none at 0, all at 0.25. Without it, all. */
+  phase?: number;
+  /** Draws the boundary as it is without displacement, too, so that one sees through it. */
+  undeformed?: boolean;
+}
+
 /** Two meshes beside each other. */
 export interface CompareState {
   /** Where the kept one ends and the current one begins, as a fraction of the width; 0.5 without it. */
@@ -122,6 +139,8 @@ export interface ColourState {
   reversed?: boolean;
   /** A logarithmic scale; a `range` must be positive. Without one it has the positive part of the values, and is linear where there is none. */
   log?: boolean;
+  /** So many colours, 2 to 64, each for an equal part of the range; without it they run into one another. */
+  bands?: number;
 }
 
 /** Where the camera is. */
@@ -146,6 +165,7 @@ export interface SceneState {
   cells?: CellState;
   streamlines?: StreamlineState;
   arrows?: ArrowState;
+  deform?: DeformState;
   /** Planes that cut away; with a `clipBox`, which counts as six, at most 16. */
   clips?: PlaneState[];
   /** Everything outside of this box is cut away: `[x0, y0, z0, x1, y1, z1]`. */
@@ -159,8 +179,28 @@ export interface SceneState {
   outline?: boolean;
   /** The mesh that was kept by `keep` on the left, the current one on the right. */
   compare?: CompareState;
+  /**
+   * The regions of the volume that are shown (`info.regions`), by their names or labels; all without it. Others are neither drawn nor
+   * fetched nor refined, unless a need of the request names them in its own `regions`.
+   */
+  regions?: (string | number)[];
+  /**
+   * Which tetrahedra are shown by the values of a field; all without it. It is a picture only: pass `ranges` to `refine` to fetch nothing else.
+   */
+  threshold?: ThresholdState;
   /** A box with handles. It is a picture only: pass `box` to `refine` to use it. */
   region?: ArrayLike<number>;
+}
+
+/**
+ * Which tetrahedra are shown, as a whole: those whose four vertices have a value within a range, ends included. What is drawn of the others is
+ * nothing, so the boundary is that of what is shown.
+ */
+export interface ThresholdState {
+  /** In field units, ascending. */
+  range: [low: number, high: number];
+  /** The field; the one that is shown without it. */
+  field?: string;
 }
 
 /** All that can be set: what is drawn, and where from. Plain data, for JSON and URLs. */
@@ -197,8 +237,12 @@ export interface Reading {
   position: [number, number, number];
   /** The value of each field, by its name; of fields with several time steps at the time that is shown. */
   values: Record<string, number>;
+  /** The value of each field, by its number in `info.fields`: at all time steps, as good as the mesh is at each. */
+  all: number[];
   /** The number of the tetrahedron in the current mesh. */
   tet: number;
+  /** The name of its region, as in `info.regions`; `undefined` without regions. */
+  region: string | undefined;
   /** Its longest edge, in model units. */
   size: number;
   /** Its error, as a fraction of the field's range. */
@@ -230,4 +274,6 @@ export interface Overlay {
   rotation: [right: number[], up: number[], towards: number[]];
   /** From the model to clip space, column by column: with it points of the model can be drawn over the picture. */
   matrix: number[];
+  /** How the picture is displaced: a point goes by `factor` times `part` times the vector there; `part` is what the phase leaves, −1 to 1. */
+  deformation: { factor: number; part: number } | undefined;
 }

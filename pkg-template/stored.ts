@@ -63,3 +63,24 @@ export function absolute<T extends Partial<Stored>>(stored: T): Absolute<T> {
   if (found.fields) found.fields = found.fields.map(absolute);
   return found as Absolute<T>;
 }
+
+/**
+ * A mesh or a surface displaced by a vector, in absolute numbers: each vertex goes by so many times the values of three of its fields, which
+ * are given by names or numbers. Normals, which would be those of before, are left out.
+ *
+ * @example
+ * const surface = displaced(await mt.surface({ fields: ["u_x", "u_y", "u_z"] }), ["u_x", "u_y", "u_z"], 20);
+ * @throws {TetralodError} `bad-option` if it comes without one of these fields
+ */
+export function displaced<T extends Partial<Stored> & { positions: Float32Array; fields: FieldValues[] }>(
+  stored: T,
+  components: readonly (string | number)[],
+  times: number,
+): Omit<Absolute<T>, "normals"> {
+  const { normals, ...found } = absolute(stored) as Absolute<T> & { normals?: unknown };
+  const along = components.map((one) => stored.fields.findIndex(({ index, name }) => one === index || one === name));
+  if (along.length !== 3 || along.includes(-1)) throw badOption("components", `must be three fields that come with it; given: ${components.join(", ")}`);
+  const values = along.map((i) => (found.fields as Absolute<FieldValues>[])[i].values);
+  const positions = found.positions as Float32Array | Float64Array;
+  return { ...found, positions: positions.map((x, i) => x + times * values[i % 3][Math.floor(i / 3)]) } as Omit<Absolute<T>, "normals">;
+}

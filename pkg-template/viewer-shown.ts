@@ -1,7 +1,7 @@
 /** What a viewer draws, and of which volume. */
 
 import { flattenError, known, type FlatError } from "./errors.js";
-import { changedScene, checkFields, fitScene, namesParts, withoutParts } from "./fit.js";
+import { changedScene, checkNames, fitScene, namesParts, withoutParts } from "./fit.js";
 import type { SceneChange } from "./latest.js";
 import type { Unchecked } from "./options.js";
 import type { MtInfo } from "./results.js";
@@ -63,6 +63,8 @@ export class Shown {
     this.#viewer.setScene(this.scene);
     try {
       if (camera) this.#viewer.setCamera(camera);
+      // What is deformed may leave the box of the model.
+      else if (this.scene.deform) this.#viewer.home();
     } catch (error) {
       this.#dropped.push({ part: "camera", problem: known(error).message ?? String(error) });
     }
@@ -78,7 +80,7 @@ export class Shown {
     try {
       const isFirst = this.#isFirst && !namesParts(changes ?? {});
       const scene = changedScene(this.#isFirst && !isFirst ? withoutParts(this.scene) : this.scene, changes);
-      if (this.#volume) checkFields(scene, this.#volume);
+      if (this.#volume) checkNames(scene, this.#volume);
       this.#viewer.setScene(scene);
       try {
         if (camera) this.#viewer.setCamera(camera);

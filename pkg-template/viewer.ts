@@ -23,12 +23,12 @@ import type { BlockMap, BlockProgress, Mesh, MtInfo, RefineStats, Traffic } from
 import type { Remote } from "./rpc.js";
 import type { CameraState, Legend, Misfit, Overlay, Reading, SceneState, ViewerChanges, ViewerState } from "./scene.js";
 import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
-import { absolute } from "./stored.js";
+import { absolute, displaced } from "./stored.js";
 import { type OpenSource, type RangesSource, type Source, abortable, openSource, pump, rangesOf } from "./stream.js";
 import { type AwaitOptions, type FieldOptions, setCaller, withMeshTools } from "./tools.js";
 import type { ViewerMethods } from "./viewer-worker.js";
 
-export { TetralodError, absolute };
+export { TetralodError, absolute, displaced };
 export type { BlockMap, Traffic } from "./results.js";
 export type {
   ArrowState,
@@ -38,6 +38,7 @@ export type {
   CellState,
   ColourState,
   CompareState,
+  DeformState,
   IsosurfaceState,
   Legend,
   Misfit,
@@ -47,6 +48,7 @@ export type {
   SceneState,
   SliceState,
   StreamlineState,
+  ThresholdState,
   ViewerChanges,
   ViewerState,
   VolumeState,

@@ -2,6 +2,7 @@
 
 import { element } from "./dom.js";
 import { count, nameOf, size } from "./format.js";
+import { averagedWords } from "./averaged.js";
 import { RepairControls, repairWords } from "./repair.js";
 
 /** Names of files that an MT can be built of. */
@@ -18,6 +19,10 @@ const PHASES = {
   order: "Putting updates in order",
   encode: "Writing",
 };
+
+/** What is said where there are fields at cells. */
+const AT_CELLS =
+  "Fields at cells become fields at points: the mean of the cells around each point, weighted by volume. Peaks become lower; by how much is said after the build.";
 
 /** The dialog that is open. @type {BuildDialog | undefined} */
 let shown;
@@ -44,11 +49,13 @@ class BuildDialog {
   #name;
   #about = element("p", { textContent: "Reading…" });
   #fields = element("fieldset", { className: "choices", hidden: true });
+  #parts = element("select", { id: "build-parts" });
+  #partsRow = element("div", { className: "row", hidden: true }, element("label", { htmlFor: "build-parts" }, "Keep parts apart"), this.#parts);
   #repair = new RepairControls();
   #memory = element("p");
   #bar = element("progress", { max: 1, value: 0, ariaLabel: "Progress of the build", hidden: true });
   #status = element("p");
-  /** What the repair did. */
+  /** What the repair did, and averaging from cells. */
   #repaired = element("ul", { hidden: true });
   #error = element("p", { className: "bad", role: "alert", hidden: true });
   #start = element("button", { type: "button", textContent: "Build", disabled: true });
@@ -66,7 +73,7 @@ class BuildDialog {
     this.#dialog.setAttribute("aria-labelledby", title.id);
     const buttons = element("div", { className: "buttons" }, this.#start, this.#save, this.#cancel);
     const said = element("div", { role: "status" }, this.#status, this.#repaired);
-    const settings = [this.#fields, this.#repair.fieldset, this.#memory];
+    const settings = [this.#fields, this.#partsRow, this.#repair.fieldset, this.#memory];
     this.#dialog.append(title, this.#about, ...settings, this.#bar, said, this.#error, buttons);
     this.#start.addEventListener("click", () => this.#build());
     this.#cancel.addEventListener("click", () => this.close());
@@ -92,7 +99,8 @@ class BuildDialog {
   get #options() {
     const boxes = [...this.#fields.querySelectorAll("input")].filter((box) => box.checked);
     const cellToPoint = boxes.some((box) => box.dataset.at === "cells");
-    return { fields: boxes.map((box) => box.value), cellToPoint, signal: this.#stop.signal };
+    const preserve = this.#parts.value ? [this.#parts.value] : [];
+    return { fields: boxes.map((box) => box.value), cellToPoint, preserve, signal: this.#stop.signal };
   }
 
   async #inspect() {
@@ -102,8 +110,10 @@ class BuildDialog {
       const { format, points, tetrahedra, fields } = info;
       this.#about.textContent = `${format}, ${count(points)} points, ${count(tetrahedra)} tetrahedra`;
       this.#showFields(fields);
-      this.#repair.fieldset.hidden = tetrahedra === 0;
+      this.#showParts(fields);
+      for (const part of [this.#partsRow, this.#repair.fieldset]) part.hidden = tetrahedra === 0;
       this.#showMemory(info.memory);
+      await this.#leaveWhatDoesNotFit(info.memory.needed);
       this.#start.focus();
     } catch (error) {
       // It is not being read any more.
@@ -116,16 +126,41 @@ class BuildDialog {
   #showFields(fields) {
     // Values at cells are changed on their way to the points: only where there are no others they are taken unasked.
     const areAtPoints = fields.some(({ at }) => at === "points");
-    const boxes = fields.map(({ name, at, unit }) => {
+    const boxes = fields.map(({ name, at, unit, vector }) => {
       const checked = (at === "points") === areAtPoints;
       const box = element("input", { type: "checkbox", value: name, checked });
       box.dataset.at = at;
+      if (vector && vector.component === undefined) box.dataset.follows = vector.name;
       const label = `${name}${unit && ` (${unit})`}${at === "cells" ? ", at cells" : ""}`;
       return element("label", {}, box, ` ${label}`);
     });
-    this.#fields.replaceChildren(element("legend", { textContent: "Fields" }), ...boxes);
+    const note = element("small", { textContent: AT_CELLS, hidden: fields.every(({ at }) => at === "points") });
+    this.#fields.replaceChildren(element("legend", { textContent: "Fields" }), ...boxes, note);
     this.#fields.hidden = boxes.length === 0;
     this.#fields.addEventListener("change", () => this.#forecast());
+  }
+
+  /** Labels of parts are whole numbers at cells; which are is known when they are read. @param {import("tetralod/build").InputInfo["fields"]} fields */
+  #showParts(fields) {
+    const names = fields.filter(({ at, vector }) => at === "cells" && !vector).map(({ name }) => name);
+    const named = names.map((name) => new Option(`by ${name}`, name));
+    // An array of this name is what is meant by it.
+    const connected = names.includes("components") ? [] : [new Option("that do not touch", "components")];
+    this.#parts.replaceChildren(new Option("none", ""), ...connected, ...named);
+    this.#parts.addEventListener("change", () => this.#forecast());
+  }
+
+  /** Leaves out the last of the chosen fields, as many as memory has no room for; the first is kept in any case. @param {number} ofOne what the build needs with one field */
+  async #leaveWhatDoesNotFit(ofOne) {
+    const chosen = [...this.#fields.querySelectorAll("input")].filter((box) => box.checked);
+    const memory = chosen.length > 1 ? await this.#forecast() : undefined;
+    if (!memory || memory.fits) return;
+    const each = (memory.needed - ofOne) / (chosen.length - 1);
+    const more = Math.max(0, Math.floor((memory.available - ofOne) / each));
+    // What follows from others goes first, and then the last.
+    const inOrder = [...chosen.filter((box) => !box.dataset.follows), ...chosen.filter((box) => box.dataset.follows)];
+    for (const box of inOrder.slice(1 + more)) box.checked = false;
+    await this.#forecast();
   }
 
   /** The memory depends on the fields. */
@@ -137,7 +172,9 @@ class BuildDialog {
     try {
       const { inspect } = await import("tetralod/build");
       const { memory } = await inspect(this.#files, this.#options);
-      if (mine === this.#asked) this.#showMemory(memory);
+      if (mine !== this.#asked) return;
+      this.#showMemory(memory);
+      return memory;
     } catch (error) {
       this.#fail(error);
     }
@@ -176,7 +213,7 @@ class BuildDialog {
 
   /** Nothing can be chosen while the build runs. @param {boolean} isBusy */
   #setBusy(isBusy) {
-    for (const control of [this.#start, this.#fields, this.#repair.fieldset]) control.disabled = isBusy;
+    for (const control of [this.#start, this.#fields, this.#parts, this.#repair.fieldset]) control.disabled = isBusy;
     this.#bar.hidden = !isBusy;
   }
 
@@ -191,7 +228,7 @@ class BuildDialog {
   #finish(file, report) {
     const { tetrahedra, seconds } = report;
     this.#status.textContent = `${count(tetrahedra)} tetrahedra in ${size(file.size)}, built in ${seconds.toFixed(1)} s`;
-    const words = repairWords(report).map((textContent) => element("li", { textContent }));
+    const words = [...repairWords(report), ...averagedWords(report.averaged)].map((textContent) => element("li", { textContent }));
     this.#repaired.replaceChildren(...words);
     this.#repaired.hidden = words.length === 0;
     // Other fields, or another repair, may turn out to be better.

@@ -21,8 +21,8 @@ let draw = () => {};
 
 /** @returns {import("tetralod/viewer").ColourState} */
 export function colours() {
-  const { map, reversed, log } = store.state;
-  return { map, reversed, log, range };
+  const { map, reversed, log, bands } = store.state;
+  return { map, reversed, log, range, ...(bands ? { bands: Number(bands) } : {}) };
 }
 
 /** The gradient over the whole range of the field, of colours that are even over the range of a legend. @param {import("tetralod/viewer").Legend} legend */

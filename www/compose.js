@@ -43,7 +43,7 @@ async function overlay(width, height) {
   const [from, to] = [shown, copy].map((svg) => [...svg.querySelectorAll("*")]);
   for (const [i, element] of from.entries()) {
     const style = getComputedStyle(element);
-    if (style.display === "none" || element.matches(".face, .face *")) to[i].setAttribute("display", "none");
+    if (style.display === "none" || element.matches(".face, .face *, .aid, .aid *")) to[i].setAttribute("display", "none");
     for (const name of STYLES) /** @type {SVGElement} */ (to[i]).style.setProperty(name, style.getPropertyValue(name));
   }
   copy.setAttribute("viewBox", `0 0 ${shown.clientWidth} ${shown.clientHeight}`);
@@ -85,5 +85,5 @@ function legend(context, stage) {
     context.fillText(element.textContent ?? "", x, y + height / 2);
   };
   words($("legend-name"), 600);
-  for (const tick of all("#legend-ticks :not([hidden])")) words(tick, 400);
+  for (const part of all("#legend-marks span, #legend-ticks :not([hidden]), #legend-note:not([hidden]) span")) words(part, 400);
 }

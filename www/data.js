@@ -5,7 +5,8 @@ import { $, all, describe, shape, svg } from "./dom.js";
 import { shownField } from "./fields.js";
 import { count, milliseconds, percentage, size } from "./format.js";
 import { stateNow } from "./history.js";
-import { note } from "./messages.js";
+import { measured } from "./measures.js";
+import { copied } from "./messages.js";
 import { demo, viewer } from "./page.js";
 import { ticks } from "./plot.js";
 import { store } from "./state.js";
@@ -187,6 +188,7 @@ export function report() {
     firstPicture: { milliseconds: demo.firstFrameMs, bytes: demo.firstFrameBytes },
     blocks: demo.blocks,
     traffic,
+    measures: measured(),
     uploaded,
     gpuBytes,
     meshes,
@@ -207,11 +209,5 @@ export function attachData() {
   new ResizeObserver(() => shownTab() === "data" && show()).observe($("data-panel"));
   $("map-blocks").addEventListener("click", () => map("block"));
   $("map-missing").addEventListener("click", () => map("missing"));
-  $("copy-data").addEventListener("click", async () => {
-    const text = JSON.stringify(report(), undefined, 2);
-    await navigator.clipboard.writeText(text).then(
-      () => note("Numbers copied as JSON"),
-      () => note("The browser does not let this page copy"),
-    );
-  });
+  $("copy-data").addEventListener("click", () => copied(JSON.stringify(report(), undefined, 2), "Numbers copied as JSON"));
 }

@@ -4,10 +4,12 @@ import { FIRST, pointsOf } from "./curve.js";
 import { $ } from "./dom.js";
 import { isovalue, isovaluePart, shownField } from "./fields.js";
 import { rounded } from "./format.js";
+import { leavesNothing } from "./geometry.js";
 import { demo, volume } from "./page.js";
 import { beside, mode } from "./parts.js";
-import { cutsAll, movePlane, placeOfPlane, span } from "./planes.js";
+import { cutsAll, missesAll, movePlane, nameOf, planes, span } from "./planes.js";
 import { cutBox } from "./region.js";
+import { shownRegions } from "./regions.js";
 import { LOOKS } from "./scene.js";
 import { store } from "./state.js";
 
@@ -25,7 +27,7 @@ function useFirstIsovalue() {
   $("isovalue").focus();
 }
 
-/** Why a view whose surface has no triangle shows none. @type {Record<string, () => Reason>} */
+/** Why a view whose surface has no triangle shows none. @type {Record<string, () => Reason | undefined>} */
 const MISSED = {
   iso() {
     const { name, min, max } = shownField();
@@ -40,20 +42,38 @@ const MISSED = {
 
 /** Why nothing is left of what is drawn. @returns {Reason | undefined} */
 function cutAway() {
-  const { axis, low, high } = span();
   const box = cutBox();
-  const [at, from, to] = [placeOfPlane(), low, high].map((x) => rounded(x, high - low));
+  if (shownRegions()?.length === 0) return { words: "All parts are hidden.", label: "Show all parts", act: () => store.change({ hidden: [] }) };
   if (box && !meetsModel(box)) return { words: "Everything is cut away: nothing of the model is in the box of the region.", ...whole };
-  if (box && mode() === "slice" && (placeOfPlane() < box[axis] || placeOfPlane() > box[axis + 3])) {
-    return { words: `There is no section: the plane ${"xyz"[axis]} = ${at} is outside of the box of the region.`, ...whole };
+  if (box && mode() === "slice" && missesAll(box)) {
+    return { words: `There is no section: the plane ${$("cut-text").textContent} is outside of the box of the region.`, ...whole };
   }
-  if (["solid", "mesh"].includes(mode()) && cutsAll()) {
-    return { words: `Everything is cut away: the model lies between ${"xyz"[axis]} = ${from} and ${to}.`, ...middleOfPlane };
+  const isClipped = ["solid", "mesh"].includes(mode());
+  const number = cutsAll();
+  if (isClipped && number >= 0) {
+    const plane = store.state.planes[number];
+    const { low, high } = span(plane);
+    const [from, to] = [low, high].map((x) => rounded(x, high - low));
+    const words = `Everything is cut away: the model lies between ${nameOf(plane)} = ${from} and ${to}.`;
+    return { words, label: middleOfPlane.label, act: () => movePlane(undefined, number) };
+  }
+  if (isClipped && leavesNothing(planes(), volume().bounds)) {
+    const act = () => store.change({ planes: store.state.planes.slice(0, 1), plane: 0 });
+    return { words: "Everything is cut away: together the planes leave nothing of the model.", label: "Keep the first plane alone", act };
   }
   if (mode() === "volume" && pointsOf(store.state.transfer, isovaluePart()).every(([, opacity]) => opacity === 0)) {
     return { words: "The volume is transparent: no value has an opacity.", label: "Use the ramp", act: () => store.change({ transfer: FIRST }) };
   }
   return undefined;
+}
+
+/** Why a threshold may leave nothing. @returns {Reason | undefined} */
+function noCell() {
+  const range = store.state.threshold;
+  if (!range || mode() === "volume") return undefined;
+  const { name, min, max } = shownField();
+  const [low, high] = range.map((x) => rounded(x, max - min));
+  return { words: `No cell has all values of ${name} from ${low} to ${high}.`, label: "Show all cells", act: () => store.change({ threshold: undefined }) };
 }
 
 /** Whether a box with a volume has a part in common with the model. @param {import("./volume.js").Box} box */
@@ -80,7 +100,8 @@ let reason;
 /** Says so where nothing is seen and no step may yet change that: the last step may come before or after the last frame. */
 export function showEmpty() {
   const isSettled = demo.step?.done === true && demo.info !== undefined;
-  reason = isSettled && beside().length === 0 ? (cutAway() ?? (frameIsEmpty ? MISSED[mode()]?.() : undefined)) : undefined;
+  const missed = () => noCell() ?? MISSED[mode()]?.();
+  reason = isSettled && beside().length === 0 ? (cutAway() ?? (frameIsEmpty ? missed() : undefined)) : undefined;
   $("empty").hidden = !reason;
   if (!reason) return;
   if ($("empty-text").textContent !== reason.words) $("empty-text").textContent = reason.words;

@@ -2,20 +2,24 @@
 
 import { absolute } from "tetralod/viewer";
 import { compose } from "./compose.js";
+import { isDeformed, saved } from "./deform.js";
 import { $, all, button, element, input, select } from "./dom.js";
 import { isovalue, shownField } from "./fields.js";
 import { count } from "./format.js";
 import { showIdle } from "./idle.js";
+import { nameWithUnit } from "./lengths.js";
 import { fail, note } from "./messages.js";
+import { hasTimes, plotOf, valuesOverTime } from "./overtime.js";
 import { demo, page, viewer } from "./page.js";
-import { placeOfPlane, plane, span } from "./planes.js";
+import { alongAlways, alongNow, legsOf, lengthOf, NAMES as PROBES } from "./path.js";
+import { nameOf as nameOfPlane, placeOfPlane, plane, span } from "./planes.js";
 import { draw } from "./scene.js";
 import { volumeName } from "./source.js";
 import { onTab } from "./tabs.js";
 import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "./writers.js";
 
 /** @param {string} name @param {BlobPart[]} parts @param {string} type */
-function saveAs(name, parts, type) {
+export function saveAs(name, parts, type) {
   const link = element("a", { href: URL.createObjectURL(new Blob(parts, { type })), download: name });
   link.click();
   // Once the browser has begun to save it.
@@ -53,28 +57,42 @@ async function legend() {
 
 /** The triangles that are chosen, with the colours that their values have. */
 async function coloured() {
-  const [surface, colours] = [await triangles(), await legend()];
+  const [surface, colours] = [await drawn(), await legend()];
   return colours ? { ...surface, colours: coloursOf(absolute(surface).values, colours) } : surface;
 }
 
-/** The values at the probes, and along the line between two of them. */
+/** The triangles that are chosen, where they are drawn. @returns {ReturnType<typeof triangles>} */
+async function drawn() {
+  if (!isDeformed()) return triangles();
+  const { normals, fields, ...surface } = await triangles(ALL);
+  const { positions } = saved({ ...surface, fields });
+  // As it came: relative to its origin, with values as they are stored.
+  return { ...surface, fields: [], positions: Float32Array.from(positions, (x, i) => x - surface.origin[i % 3]) };
+}
+
+/** The values at the probes, and on the way between them. */
 async function probes() {
   const { pins } = page.probes;
   if (pins.length === 0) return undefined;
+  const { name } = shownField();
   const names = Object.keys(pins[0].values);
-  const head = ["what", "x", "y", "z", "distance", ...names];
-  /** @param {string} what @param {number[]} position @param {Record<string, number>} values @returns {(string | number | undefined)[]} */
-  const row = (what, position, values) => [what, ...position, distance(position), ...names.map((name) => values[name])];
-  const distance = (/** @type {number[]} */ to) => Math.hypot(...to.map((x, i) => x - pins[0].position[i]));
-  const rows = pins.map(({ position, values }, i) => row(`probe ${"AB"[i]}`, position, values));
-  if (pins.length < 2) return csv([head, ...rows]);
-  const [from, to] = pins.map(({ position }) => position);
-  const { at, values } = await viewer().line(from, to);
-  const onLine = Array.from(at, (part, i) => {
-    const position = from.map((x, axis) => x + part * (to[axis] - x));
-    return row("line", position, { [shownField().name]: values[i] });
-  });
-  return csv([head, ...rows, ...onLine]);
+  const now = hasTimes() ? [shownField().time] : [];
+  const head = ["what", ...["x", "y", "z", "distance"].map((word) => nameWithUnit(word)), ...(hasTimes() ? ["time"] : []), ...names];
+  const legs = legsOf(pins.map(({ position }) => position));
+  /** @param {string} what @param {{ position: number[], distance: number }} place @param {Record<string, number | undefined>} values @param {(number | undefined)[]} time @returns {(string | number | undefined)[]} */
+  const row = (what, { position, distance }, values, time = now) => [what, ...position, distance, ...time, ...names.map((name) => values[name])];
+  // What is plotted over time is there at each of these times.
+  /** @param {string} what @param {{ position: number[], distance: number }} place @param {readonly number[]} all */
+  const overTime = (what, place, all) => valuesOverTime(name, all).map(({ time, value }) => row(`${what} over time`, place, { [name]: value }, [time]));
+  const places = pins.map((pin, i) => ({ ...pin, what: `probe ${PROBES[i]}`, distance: lengthOf(legs.slice(0, i)) }));
+  const kind = plotOf(pins.length);
+  return csv([
+    head,
+    ...places.map((place) => row(place.what, place, place.values)),
+    ...(kind === "1" ? places.flatMap((place) => overTime(place.what, place, place.all)) : []),
+    ...(await alongNow(legs)).map((place) => row("line", place, { [name]: place.value })),
+    ...(kind === "line" ? await alongAlways(legs) : []).flatMap((place) => (place.value ? overTime("line", place, place.value) : [])),
+  ]);
 }
 
 /** What is asked for of files that hold all fields. */
@@ -82,10 +100,10 @@ const ALL = { fields: true };
 
 /** How each file is made. @type {Record<string, () => Promise<[parts: BlobPart[] | undefined, type: string]>>} */
 const MAKERS = {
-  vtu: async () => [vtu(absolute(await viewer().mesh(ALL)), shownField().number), "application/xml"],
-  vtk: async () => [vtk(absolute(await viewer().mesh(ALL)), shownField().number), "application/octet-stream"],
-  stl: async () => [stl(await triangles()), "model/stl"],
-  ply: async () => [ply(absolute(await triangles(ALL))), "application/octet-stream"],
+  vtu: async () => [vtu(absolute(saved(await viewer().mesh(ALL))), shownField().number), "application/xml"],
+  vtk: async () => [vtk(absolute(saved(await viewer().mesh(ALL))), shownField().number), "application/octet-stream"],
+  stl: async () => [stl(await drawn()), "model/stl"],
+  ply: async () => [ply(absolute(saved(await triangles(ALL)))), "application/octet-stream"],
   glb: async () => [glb(await coloured()), "model/gltf-binary"],
   csv: async () => [await probes(), "text/csv"],
 };
@@ -93,7 +111,7 @@ const MAKERS = {
 /** What surfaces that are saved are called. @type {Record<string, () => string>} */
 const SURFACES = {
   isosurface: () => `isosurface-${isovalue()}`,
-  slice: () => `section-${"xyz"[span().axis]}-${Number(placeOfPlane().toPrecision(6))}`,
+  slice: () => `section-${nameOfPlane()}-${Number(placeOfPlane().toPrecision(6))}`,
   boundary: () => "boundary",
 };
 const surfaceName = () => SURFACES[select("surface-kind").value]();
@@ -101,7 +119,7 @@ const surfaceName = () => SURFACES[select("surface-kind").value]();
 const NAMES = { stl: surfaceName, ply: surfaceName, glb: surfaceName, csv: () => "probes" };
 
 /** The name of a file that is made of the volume. @param {string | undefined} words @param {string} ending */
-const fileName = (words, ending) => `${[volumeName(), ...(words ? [words] : [])].join("-").replaceAll(/[\\/:*?"<>|]/g, "_")}.${ending}`;
+export const fileName = (words, ending) => `${[volumeName(), ...(words ? [words] : [])].join("-").replaceAll(/[\\/:*?"<>|]/g, "_")}.${ending}`;
 
 async function exportAs(/** @type {string} */ kind) {
   if (!demo.info) return;
@@ -110,9 +128,15 @@ async function exportAs(/** @type {string} */ kind) {
   saveAs(fileName(NAMES[kind]?.(), kind), parts, type);
 }
 
-async function savePicture(/** @type {HTMLCanvasElement} */ canvas) {
+/** The size that is chosen for pictures. @param {HTMLCanvasElement} canvas */
+export function pictureSize(canvas) {
   const factor = Number(select("shot-scale").value) * devicePixelRatio;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * factor));
+  return { width, height };
+}
+
+async function savePicture(/** @type {HTMLCanvasElement} */ canvas) {
+  const { width, height } = pictureSize(canvas);
   const picture = await viewer().screenshot({ width, height });
   const all = input("shot-overlay").checked ? await compose(picture, { width, height, canvas }) : picture;
   saveAs(fileName(`${width}x${height}`, "png"), [all], "image/png");

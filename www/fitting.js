@@ -29,6 +29,11 @@ const LIMITS = {
     const [from, to] = numbers(words);
     return !isNumbers(words, 2) || (to >= low && from <= high) ? undefined : ["", `colours of ${rangeWords(from, to)} (${field} is ${rangeWords(low, high)})`];
   },
+  threshold(words, field) {
+    const [low, high] = rangeOf(field);
+    const [from, to] = numbers(words);
+    return !isNumbers(words, 2) || (to >= low && from <= high) ? undefined : ["", `cells of ${rangeWords(from, to)} (${field} is ${rangeWords(low, high)})`];
+  },
   box(words) {
     const { bounds } = volume();
     const box = numbers(words);
@@ -67,7 +72,7 @@ function untaken(words) {
     named(name)
       .find((one) => one.value === value)
       ?.parentElement?.textContent.trim() ?? value;
-  const lists = /** @type {const} */ ({ field: "field", "surface-colour": "colours of", vector: "vector", time: "time step" });
+  const lists = /** @type {const} */ ({ field: "field", "surface-colour": "colours of", vector: "vector", deform: "deformed by", time: "time step" });
   const lost = Object.entries(lists).flatMap(([id, what]) =>
     words[id] && String(state[/** @type {keyof typeof lists} */ (id)]) !== words[id] ? [`${what} ${words[id]}`] : [],
   );

@@ -2,9 +2,10 @@
 
 import { $, text } from "./dom.js";
 import { page, volume } from "./page.js";
-import { seedPlane } from "./planes.js";
+import { across, dot, plus } from "./geometry.js";
+import { corners, placeOfPlane, span } from "./planes.js";
 import { store } from "./state.js";
-import { vectors } from "./volume.js";
+import { isInside, vectors } from "./volume.js";
 
 /** Seeds have so many digits: as many as links keep. */
 const DIGITS = 12;
@@ -21,16 +22,12 @@ export const flowUnit = () => volume().fields.find(({ name }) => name === compon
 
 /** A click at a point of the canvas: one more seed on the plane; whether there is one. @param {[number, number]} point */
 export function addSeed(point) {
-  const { axis, at } = seedPlane();
-  const found = page.overlay.onPlane(point, axis, at);
-  if (!found) return false;
+  const found = page.overlay.onPlane(point, span().normal, placeOfPlane());
+  if (!found || !isInside(found)) return false;
   const [x, y, z] = found.map((one) => Number(one.toPrecision(DIGITS)));
   store.change({ seeds: [...store.state.seeds, [x, y, z]] });
   return true;
 }
-
-/** The plane of the seeds, with those that were clicked, for the overlay. */
-export const seedQuad = () => ({ ...seedPlane(), bounds: volume().bounds, seeds: store.state.seeds });
 
 /** What is drawn. @returns {import("tetralod/viewer").SceneState} */
 export function flowScene() {
@@ -43,22 +40,18 @@ export function flowScene() {
   };
 }
 
-/** Seeds in a square grid across the volume, on the plane of the seeds. @returns {Point[]} */
+/** Seeds in a grid across the chosen plane, in the volume. @returns {Point[]} */
 function rake() {
-  const { bounds } = volume();
-  const { axis, at } = seedPlane();
-  const [first, second] = [(axis + 1) % 3, (axis + 2) % 3];
-  const between = (/** @type {number} */ i, /** @type {number} */ part) => bounds[i] + part * (bounds[i + 3] - bounds[i]);
-  // The middles of equal parts: none lies on the boundary.
-  const parts = Array.from({ length: store.state.rake }, (_, i) => (i + 0.5) / store.state.rake);
-  return parts.flatMap((one) =>
-    parts.map((other) => {
-      /** @type {Point} */
-      const seed = [0, 0, 0];
-      [seed[axis], seed[first], seed[second]] = [at, between(first, one), between(second, other)];
-      return seed;
-    }),
-  );
+  const { normal } = span();
+  const ways = across(normal);
+  const [first, second] = ways.map((way) => {
+    const ends = corners().map((corner) => dot(corner, way));
+    const [low, high] = [Math.min(...ends), Math.max(...ends)];
+    // The middles of equal parts: none lies on the boundary.
+    return Array.from({ length: store.state.rake }, (_, i) => low + ((i + 0.5) / store.state.rake) * (high - low));
+  });
+  const onAxis = plus([0, 0, 0], normal, placeOfPlane());
+  return first.flatMap((one) => second.map((other) => plus(plus(onAxis, ways[0], one), ways[1], other))).filter(isInside);
 }
 
 export function attachFlow() {

@@ -48,6 +48,18 @@ function digitsIn(value, range, digits) {
   return Math.min(digits + (farther > 1 && farther < Infinity ? Math.ceil(Math.log10(farther)) : 0), MOST_DIGITS);
 }
 
+/** A number in at most six digits, those in front of the point in groups. @param {number} value */
+export function grouped(value) {
+  const short = Number(value.toPrecision(6));
+  const magnitude = Math.abs(short);
+  if (short !== 0 && (magnitude < 1e-4 || magnitude >= 1e9)) return short.toExponential().replaceAll("-", "−");
+  const [whole, part] = String(magnitude).split(".");
+  return `${short < 0 ? "−" : ""}${count(Number(whole))}${part ? `.${part}` : ""}`;
+}
+
+/** An angle, given in degrees. @param {number} angle */
+export const degrees = (angle) => `${Number(angle.toFixed(2))}°`;
+
 /** The length of the diagonal of a box `[x0, y0, z0, x1, y1, z1]`. @param {ArrayLike<number>} bounds */
 export const diagonalOf = (bounds) => Math.hypot(...[0, 1, 2].map((i) => bounds[i + 3] - bounds[i]));
 

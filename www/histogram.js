@@ -1,5 +1,6 @@
 /** The histogram of the field above the slider of the isovalue: a press or a drag on it chooses the isovalue. */
 
+import { averagedNote } from "./averaged.js";
 import { histogramPath, isLogarithmic, SIZE } from "./bins.js";
 import { $, all, svg } from "./dom.js";
 import { isovaluePart, setIsovalue, shownField } from "./fields.js";
@@ -13,12 +14,13 @@ const { width: WIDTH, margin: MARGIN } = SIZE;
 export async function showHistogram() {
   if (!["iso", "volume"].includes(store.state.view) || !demo.info) return;
   // That of the file is of the reference mesh; without it, that of the mesh which is shown.
-  const { min, max, histogram: known } = shownField();
+  const field = shownField();
+  const { min, max, histogram: known } = field;
   const volumes = known ?? (await viewer().stats({ bins: 100, range: [min, max] })).histogram;
   page.transfer.volumes = volumes;
   $("histogram-volumes", SVGPathElement).setAttribute("d", histogramPath(volumes));
   const words = `Volume of each value, as ${isLogarithmic(volumes) ? "logarithms" : "square roots"}`;
-  for (const note of all(".histogram-note")) note.textContent = words;
+  for (const note of all(".histogram-note")) note.textContent = [words, ...averagedNote([field])].join("; ");
 }
 
 /** Shows where the isovalue is. */

@@ -1,7 +1,7 @@
 /** The state in the address of the page, so that a reload or a link shows the same; undo and redo go back and forth in it. */
 
 import { $, button } from "./dom.js";
-import { note } from "./messages.js";
+import { copied } from "./messages.js";
 import { open, tell } from "./opening.js";
 import { demo } from "./page.js";
 import { fileNameIn, sourceWords } from "./source.js";
@@ -96,15 +96,10 @@ export const redo = () => step(future, past);
 const reset = () => restore({ url: sourceWords() });
 
 /** Copies the address of the page, which has its whole state. */
-export async function share() {
+export function share() {
   save();
   const isFile = fileNameIn(sourceWords()) !== undefined;
-  try {
-    await navigator.clipboard.writeText(location.href);
-    note(isFile ? "Link copied. It does not contain your file, and asks for it" : "Link copied");
-  } catch {
-    note("The browser does not let this page copy: the link is in the address bar");
-  }
+  copied(location.href, isFile ? "Link copied. It does not contain your file, and asks for it" : "Link copied", ": the link is in the address bar");
 }
 
 export function attachHistory() {

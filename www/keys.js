@@ -1,6 +1,8 @@
 /** The keys of the page: one table, from which the overlay with all keys is made. `controls.js` has what those of the picture do. */
 
+import { toggleDeformation } from "./deform.js";
 import { $, dialog, element, named } from "./dom.js";
+import { toggleExtremes } from "./extremes.js";
 import { openGallery } from "./gallery.js";
 import { redo, share, undo } from "./history.js";
 import { hideMessage } from "./messages.js";
@@ -35,6 +37,7 @@ const TABLE = {
     { keys: ["+", "−"], what: "zoom" },
     { keys: ["Home", "R"], what: "reset the camera" },
     { keys: ["P"], what: "probe the middle" },
+    { keys: ["Tab"], what: "to the handle of the plane: arrows move and tilt it, with Shift finely" },
     { keys: ["W", "A", "S", "D", "Q", "E"], what: "fly, with the setting Fly; with Shift faster" },
   ],
   "Views": [
@@ -43,6 +46,8 @@ const TABLE = {
   ],
   "Everywhere": [
     { keys: ["V"], what: "to the picture", act: () => $("canvas").focus() },
+    { keys: ["D"], what: "deformed shape, or as it is", act: toggleDeformation },
+    { keys: ["M"], what: "mark the extremes, or not", act: toggleExtremes },
     { keys: ["I"], what: "to the isovalue", act: () => toControl("isovalue") },
     { keys: ["O"], what: "gallery and files", act: openGallery },
     { keys: ["G"], what: "settings", act: () => showTab("settings") },

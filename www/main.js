@@ -5,13 +5,13 @@
  * - `store`, `state`, `history`: what is set, in one store; its words; the address, undo and redo, which are made of it
  * - `page`, `volume`, `source`: what has come of the volume, what it has, where it comes from
  * - `opening`, `fitting`, `gallery`, `thumbnails`, `files`, `build`, `repair`: opening a volume, from the list or of the user; what of the settings fits it
- * - `parts`, `planes`, `fields`, `play`, `region`, `request`: controls, and what is asked of the mesh
+ * - `parts`, `planes`, `fields`, `play`, `region`, `regions`, `request`: controls, and what is asked of the mesh
  * - `scene`, `colours`, `curve`, `transfer`, `histogram`, `bins`, `flow`, `compare`, `theme`: how it looks
  * - `camera`, `controls`, `picture`, `keys`, `tabs`: where it is looked from; mouse, touch and keys
- * - `overlay`, `probes`, `plot`, `empty`, `messages`: what lies over the picture
- * - `numbers`, `data`, `blockmap`, `idle`: what has arrived; controls that do nothing now
+ * - `overlay`, `handles`, `probes`, `path`, `overtime`, `plot`, `empty`, `messages`: what lies over the picture; the field at probes and between them
+ * - `numbers`, `data`, `measures`, `blockmap`, `idle`: what has arrived, and what is measured; controls that do nothing now
  * - `export`, `writers`, `compose`: files that are saved
- * - `dom`, `format`: elements, and numbers as words
+ * - `dom`, `format`, `lengths`, `geometry`: elements, numbers as words, their unit if they are lengths, vectors
  *
  * What shows or uses a part of the state subscribes to it; what changes it, a control or the viewer, changes the store alone. So
  * the address, undo, the controls and the picture cannot disagree. A control that is part of the state has an entry in `state`. Types are
@@ -24,18 +24,23 @@ import { attachColours } from "./colours.js";
 import { attachComparison } from "./compare.js";
 import { attachControls } from "./controls.js";
 import { attachData, record } from "./data.js";
+import { attachDeform } from "./deform.js";
 import { $, announce, attachDialogs, svg } from "./dom.js";
 import { attachEmpty } from "./empty.js";
 import { attachExport } from "./export.js";
+import { attachExtremes } from "./extremes.js";
 import { attachFields } from "./fields.js";
 import { attachFiles } from "./files.js";
 import { addSeed, attachFlow } from "./flow.js";
 import { attachGallery, openGallery, readVolumes, sceneOf, shown, showPoster } from "./gallery.js";
+import { attachHandles } from "./handles.js";
 import { attachHistogram } from "./histogram.js";
 import { attachHistory, hold } from "./history.js";
 import { attachIdle } from "./idle.js";
 import { attachKeys } from "./keys.js";
+import { attachMeasures } from "./measures.js";
 import { attachMessages, fail, say } from "./messages.js";
+import { attachMovie } from "./movie.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
 import { onOpened, open, retry, showInList } from "./opening.js";
 import { OverlayView } from "./overlay.js";
@@ -46,12 +51,14 @@ import { attachPlanes } from "./planes.js";
 import { attachPlay } from "./play.js";
 import { Probes } from "./probes.js";
 import { attachRegion, boxWasDragged, useBox } from "./region.js";
+import { attachRegions } from "./regions.js";
 import { attachRequest } from "./request.js";
 import { attachScene, draw, showLegend } from "./scene.js";
 import { source } from "./source.js";
 import { attachState, read, store } from "./state.js";
 import { attachTabs } from "./tabs.js";
 import { attachTheme } from "./theme.js";
+import { attachThreshold } from "./threshold.js";
 import { TransferEditor } from "./transfer.js";
 
 /** @typedef {Promise<import("./gallery.js").Listed | undefined>} Listed the volume that is shown where no address says another one */
@@ -94,16 +101,32 @@ async function start() {
   });
   page.transfer = new TransferEditor();
   // Controls first, then what is made of their values: the request and the scene, then what is said of these.
-  for (const attach of [attachState, attachParts, attachPlanes, attachFields, attachPlay, attachFlow, attachComparison, attachHistogram]) attach();
+  for (const attach of [
+    attachState,
+    attachParts,
+    attachPlanes,
+    attachFields,
+    attachRegions,
+    attachPlay,
+    attachFlow,
+    attachDeform,
+    attachThreshold,
+    attachComparison,
+    attachHistogram,
+  ])
+    attach();
   attachColours(draw);
-  for (const attach of [attachCamera, attachRegion, attachRequest, attachScene, attachEmpty, attachIdle, attachPicture]) attach();
+  for (const attach of [attachCamera, attachRegion, attachRequest, attachScene, attachHandles, attachEmpty, attachIdle, attachPicture, attachExtremes])
+    attach();
   attachFiles();
   attachHistory();
   attachGallery();
   onOpened(shown);
   attachBlockMap();
   attachData();
+  attachMeasures();
   attachExport(canvas);
+  attachMovie(canvas);
   await begin(listed);
 }
 
@@ -176,11 +199,9 @@ function attachOverlay(viewer) {
   page.probes = new Probes();
   viewer.addEventListener("overlay", ({ detail }) => (page.overlay.data = detail));
   store.subscribe(["axes"], () => (page.overlay.showsAxes = store.state.axes));
+  store.subscribe(["unit"], () => (page.overlay.unit = store.state.unit));
   $("unpin").addEventListener("click", () => page.probes.clear());
-  $("box-of-pins").addEventListener("click", () => {
-    const [one, other] = page.probes.pins;
-    if (other) useBox(page.probes.boxOf(one.position, other.position));
-  });
+  $("box-of-pins").addEventListener("click", () => useBox(page.probes.boxOf(...page.probes.pins.map(({ position }) => position))));
 }
 
 /** A click on the picture, or its key: a seed of a streamline on the plane in the view of the flow, a probe in all others. @param {Point} point */

@@ -14,6 +14,7 @@ const TITLES = {
   "device-lost": "The GPU was reset. Reload the page",
   truncated: "The file is incomplete",
   "too-large": "The mesh is too large for this GPU",
+  "bad-option": "This cannot be shown",
 };
 
 /** Errors that may be gone when the same is tried again. */
@@ -79,6 +80,14 @@ export function note(words, action) {
     });
     $("note").append(" ", button);
   }
+}
+
+/** Copies a text, and says so, or that it cannot be. @param {string} text @param {string} words */
+export function copied(text, words, otherwise = "") {
+  navigator.clipboard.writeText(text).then(
+    () => note(words),
+    () => note(`The browser does not let this page copy${otherwise}`),
+  );
 }
 
 /** @param {() => void} onRetry */

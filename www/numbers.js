@@ -2,9 +2,11 @@
 
 import { $, all, announce, element } from "./dom.js";
 import { noteEmpty, showEmpty } from "./empty.js";
+import { refreshExtremes } from "./extremes.js";
 import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./format.js";
 import { showHistogram } from "./histogram.js";
 import { showIdle } from "./idle.js";
+import { refreshMeasures } from "./measures.js";
 import { fail } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
 import { budget, errorPixels } from "./request.js";
@@ -68,6 +70,8 @@ export function showStats(stats) {
   // The mesh is not complete while data is missing.
   if (!stats.missing) demo.stats = stats;
   page.probes.refresh();
+  refreshExtremes();
+  refreshMeasures();
   showHistogram().catch(fail);
   const bound = percentage(stats.relativeErrorBound * 100);
   $("n-error").textContent = bound;

@@ -2,12 +2,14 @@
 
 import { cameraIsNew } from "./camera.js";
 import { $, select } from "./dom.js";
+import { listVectors } from "./deform.js";
 import { listFields } from "./fields.js";
 import { showFitting } from "./fitting.js";
 import { nameOf } from "./format.js";
 import { fail, hideMessage, note } from "./messages.js";
 import { showGrowth } from "./numbers.js";
 import { demo, viewer } from "./page.js";
+import { listRegions } from "./regions.js";
 import { afterFirst, firstRequest, stopHolding } from "./request.js";
 import { fileNameIn, isNew, setOrigin, source, sourceOf } from "./source.js";
 import { carriedOver, store } from "./state.js";
@@ -57,7 +59,7 @@ export async function open(wanted, words) {
   stopHolding();
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined, request: undefined, blocks: undefined });
   Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
-  store.change({ playing: false, freeze: false, kept: false });
+  store.change({ playing: false, swinging: false, freeze: false, kept: false });
   hideMessage();
   $("legend").hidden = true;
   $("loading").classList.remove("done");
@@ -130,6 +132,8 @@ function arrive(info, words) {
   demo.info = info;
   $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
   listFields();
+  listRegions();
+  listVectors();
   cameraIsNew();
   const { lost, ignored } = showFitting(words);
   tell(lost, ignored);

@@ -7,9 +7,10 @@
  */
 
 import { shape } from "./dom.js";
+import { across, plus } from "./geometry.js";
 
 /** Widths of characters and heights of lines of labels, in pixels. */
-const LABEL = { width: 7, height: 15 };
+const LABEL = { width: 7, height: 15, name: 8.5 };
 /** Of the ends of ticks and of labels from the axis, in pixels. */
 const TICK = 6;
 const GAP = 10;
@@ -33,7 +34,7 @@ const FACES = NAMES.flatMap((name, axis) =>
 
 /** @typedef {{ left: number, top: number, right: number, bottom: number }} Box */
 /** @typedef {ArrayLike<number> & Iterable<number>} Coordinates */
-/** @typedef {{ axis: number, at: number, bounds: ArrayLike<number>, seeds: readonly Coordinates[] }} Quad */
+/** A plane in the box, and points on it; as an aid it is no part of pictures that are saved. @typedef {{ corners: readonly Coordinates[], seeds: readonly Coordinates[], isAid: boolean }} Section */
 /** @typedef {{ center: number[], radius: number }} Sphere */
 /** @typedef {[x: number, y: number]} Pixels */
 
@@ -47,12 +48,13 @@ export class OverlayView {
   /** @type {import("tetralod/viewer").Overlay | undefined} */
   #data;
   #showsAxes = true;
-  /** @type {Quad | undefined} */
-  #quad;
+  #unit = "";
+  /** @type {Section | undefined} */
+  #section;
   /** @type {Sphere | undefined} */
   #sphere;
   /** What lies over the picture, and must stay free of labels: elements of the page. @type {HTMLElement[]} */
-  #covered;
+  #over;
   /** What is told when places on the screen have changed. @type {(() => void)[]} */
   #followers = [];
 
@@ -62,7 +64,7 @@ export class OverlayView {
    */
   constructor(svg, { covered, onSide }) {
     this.#svg = svg;
-    this.#covered = covered;
+    this.#over = covered;
     this.#faces = FACES.map((face) => {
       const group = shape("g", { class: `face face-${NAMES[face.axis]}` });
       group.append(shape("polygon"), shape("text", {}, face.label), shape("title", {}, `Look at ${face.label}`));
@@ -79,6 +81,11 @@ export class OverlayView {
     this.#draw();
   }
 
+  /** How the last picture is displaced; undefined where it is not. */
+  get deformation() {
+    return this.#data?.deformation;
+  }
+
   /** Right, up and towards the eye, as directions in the model; undefined while nothing is drawn. */
   get rotation() {
     return this.#data?.rotation;
@@ -90,9 +97,15 @@ export class OverlayView {
     this.#draw();
   }
 
-  /** A plane across the box, and points on it; undefined for none. @param {Quad | undefined} quad */
-  set quad(quad) {
-    this.#quad = quad;
+  /** What stands behind lengths; empty for nothing. @param {string} unit */
+  set unit(unit) {
+    this.#unit = unit;
+    this.#draw();
+  }
+
+  /** A plane across the box, and points on it; undefined for none. @param {Section | undefined} section */
+  set section(section) {
+    this.#section = section;
     this.#draw();
   }
 
@@ -103,43 +116,35 @@ export class OverlayView {
   }
 
   /**
-   * The point of the plane of an axis at a coordinate that is seen at a point of the canvas; undefined if that is not in the box.
+   * The point of a plane that is seen at a point of the canvas; undefined behind the eye.
    *
    * @param {[number, number]} point
-   * @param {number} axis
-   * @param {number} at
-   * @returns {[number, number, number] | undefined}
+   * @param {import("./geometry.js").Point} normal of length 1
+   * @param {number} at where it is along that
    */
-  onPlane([x, y], axis, at) {
-    const [m, bounds] = [this.#data?.matrix, this.#quad?.bounds];
-    if (!m || !bounds) return undefined;
-    const [first, second] = [(axis + 1) % 3, (axis + 2) % 3];
-    // Two linear equations for the two other coordinates.
+  onPlane([x, y], normal, at) {
+    const m = this.#data?.matrix;
+    if (!m) return undefined;
+    const [first, second] = across(normal);
+    // Two linear equations for how far it is along these two directions.
     const equation = (/** @type {number} */ i, /** @type {number} */ screen) => {
       const part = (/** @type {number} */ column) => m[4 * column + i] - screen * m[4 * column + 3];
-      return [part(first), part(second), -(part(axis) * at + part(3))];
+      const along = (/** @type {Coordinates} */ way) => part(0) * way[0] + part(1) * way[1] + part(2) * way[2];
+      return [along(first), along(second), -(along(normal) * at + part(3))];
     };
     const [[a, b, e], [c, d, f]] = [equation(0, x), equation(1, y)];
     const determinant = a * d - b * c;
-    /** @type {[number, number, number]} */
-    const found = [0, 0, 0];
-    [found[axis], found[first], found[second]] = [at, (e * d - b * f) / determinant, (a * f - e * c) / determinant];
-    const isInside = found.every((value, i) => value >= bounds[i] && value <= bounds[i + 3]);
-    return isInside && this.project(found) ? found : undefined;
+    const onIt = plus(plus([0, 0, 0], first, (e * d - b * f) / determinant), second, (a * f - e * c) / determinant);
+    const found = plus(onIt, normal, at);
+    return this.project(found) && found;
   }
 
   /** The outline of the plane, and the points on it. */
   #plane() {
-    const group = shape("g", { class: "plane" });
-    if (!this.#quad) return group;
-    const { axis, at, bounds, seeds } = this.#quad;
-    const corner = (/** @type {number} */ one, /** @type {number} */ other) => {
-      const p = [0, 0, 0];
-      [p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]] = [at, bounds[((axis + 1) % 3) + 3 * one], bounds[((axis + 2) % 3) + 3 * other]];
-      return this.project(p);
-    };
-    const corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
-    if (corners.every(isThere)) group.append(shape("polygon", { points: corners.join(" ") }));
+    const { corners = [], seeds = [], isAid = false } = this.#section ?? {};
+    const group = shape("g", { class: `plane${isAid ? " aid" : ""}` });
+    const points = corners.map((corner) => this.project(corner));
+    if (points.length > 0 && points.every(isThere)) group.append(...["rim", "line"].map((name) => shape("polygon", { points: points.join(" "), class: name })));
     for (const [cx, cy] of seeds.map((seed) => this.project(seed)).filter(isThere)) group.append(shape("circle", { cx, cy, r: 3.5 }));
     return group;
   }
@@ -191,11 +196,16 @@ export class OverlayView {
   #draw() {
     const data = this.#data;
     this.#svg.toggleAttribute("hidden", !data);
-    if (!data) return;
+    if (data) this.#drawAll(data);
+    for (const then of this.#followers) then();
+  }
+
+  /** @param {import("tetralod/viewer").Overlay} data */
+  #drawAll(data) {
     const [right, bottom] = [this.#svg.clientWidth, this.#svg.clientHeight];
     const hasCube = this.#showsAxes && right > 260;
     /** @type {Box[]} */
-    const taken = this.#takenBoxes();
+    const taken = this.covered;
     if (hasCube) taken.push({ left: right - 2 * CUBE.right, top: 0, right, bottom: 2 * CUBE.top });
     const fits = (/** @type {Box} */ box) => box.left > 2 && box.top > 2 && box.right < right - 2 && box.bottom < bottom - 2;
     const isFree = (/** @type {Box} */ box) => fits(box) && !taken.some((other) => overlap(box, other));
@@ -209,13 +219,12 @@ export class OverlayView {
     }
     this.#moving.replaceChildren(...parts);
     this.#turnCube(data.rotation, right, hasCube);
-    for (const then of this.#followers) then();
   }
 
   /** What covers the picture, in pixels of it. @returns {Box[]} */
-  #takenBoxes() {
+  get covered() {
     const { left, top } = this.#svg.getBoundingClientRect();
-    const shown = this.#covered.filter((over) => over.offsetParent !== null && over.clientHeight > 0);
+    const shown = this.#over.filter((over) => over.offsetParent !== null && over.clientHeight > 0);
     // On large screens the overlay is enlarged by CSS: its own pixels are not those of the page.
     const zoom = this.#svg.currentCSSZoom ?? 1;
     return shown.map((over) => {
@@ -249,19 +258,21 @@ export class OverlayView {
       group.append(text(box, words));
       farthest = Math.max(farthest, Math.abs(out[0]) * (box.right - box.left) + Math.abs(out[1]) * LABEL.height);
     }
+    const name = this.#unit ? `${NAMES[axis]} in ${this.#unit}` : NAMES[axis];
     // The name is at the middle, or where there is room for it.
     const places = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9, 0, 1].map((part) => {
-      return labelBox(away([from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part], GAP + farthest + 5), out, NAMES[axis]);
+      return labelBox(away([from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part], GAP + farthest + 5), out, name, LABEL.name);
     });
     const free = places.find(place);
-    if (free) group.append(text(free, NAMES[axis], "name"));
+    if (free) group.append(text(free, name, "name"));
     return group;
   }
 
   /** The scale bar at the bottom left, above the legend. @param {import("tetralod/viewer").Overlay["scaleBar"]} bar @param {Box[]} taken @param {number} bottom */
   #scaleBar({ label, width, everywhere }, taken, bottom) {
     const length = width * this.#svg.clientWidth;
-    const words = everywhere ? label : `${label} at the target`;
+    const far = `${label} ${this.#unit}`.trim();
+    const words = everywhere ? far : `${far} at the target`;
     const wide = Math.max(length, words.length * LABEL.width * 0.92);
     const legend = taken.find((box) => box.left < 60 && box.bottom > bottom - 60);
     const left = 26;
@@ -306,9 +317,9 @@ function line(from, to) {
 }
 
 /** The box of a label whose nearest point to the axis is `at`, in the direction `out` from it. @param {Pixels} at @param {Pixels} out @param {string} words @returns {Box} */
-function labelBox(at, out, words) {
+function labelBox(at, out, words, wide = LABEL.width) {
   const [[x, y], [outX, outY]] = [at, out];
-  const [width, height] = [words.length * LABEL.width, LABEL.height];
+  const [width, height] = [words.length * wide, LABEL.height];
   const left = x + ((outX - 1) * width) / 2;
   const top = y + ((outY - 1) * height) / 2;
   return { left, top, right: left + width, bottom: top + height };

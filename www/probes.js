@@ -1,32 +1,65 @@
 /**
- * What is under the pointer, points that are kept, and a plot of the field between two of them.
+ * What is under the pointer, points that are kept, and a plot of the field between them.
  *
- * A click keeps a point as a probe; with two there is a plot. The first of three gives way. A drag with Alt makes a box of
- * the points at its ends.
+ * A click keeps a point as a probe; with two there is a plot, with three the angle at the second. The first of four gives way. A drag with Alt
+ * makes a box of the points at its ends.
  */
 
-import { $, all, describe, element, shape, svg } from "./dom.js";
+import { $, all, describe, element, select, shape, svg } from "./dom.js";
+import { drawnAt } from "./deform.js";
 import { shownField } from "./fields.js";
-import { diagonalOf, precise, rounded } from "./format.js";
+import { degrees, diagonalOf, precise, rounded } from "./format.js";
+import { nameWithUnit, withUnit } from "./lengths.js";
+import { refreshMeasures } from "./measures.js";
+import { curvesOverTime, hasTimes, plotOf, rowsOverTime } from "./overtime.js";
 import { demo, page, viewer, volume } from "./page.js";
-import { linePlot } from "./plot.js";
+import { alongAlways, alongNow, angleOf, legsOf, lengthOf, NAMES } from "./path.js";
+import { heatPlot, linePlot } from "./plot.js";
+import { hideRegion, showOnly } from "./regions.js";
 import { store } from "./state.js";
+import { AXES } from "./volume.js";
 
 /** The viewer is asked at once while it answers within this time, and otherwise when the pointer rests (in ms). */
 const QUICK = 40;
 const REST = 150;
-const MOST_PINS = 2;
+const MOST_PINS = 3;
 /** Positions in links have so many digits. */
 const DIGITS = 6;
+/** The radius of a probe in the picture (in px). */
+const MARK = 8;
 /** Fields that a list shows, at most. */
 const MOST_FIELDS = 8;
 
-const NAMES = ["A", "B"];
+/** What another click is good for, by how many probes there are. */
+const HINTS = ["", "Click at a second point for a plot", "Click at a third point for an angle"];
 
 /** @typedef {import("tetralod/viewer").Reading} Probe */
 /** @typedef {import("./volume.js").Point} Point */
 /** @typedef {import("./controls.js").Point} Spot */
 /** @typedef {import("./controls.js").Place} Place */
+/** @typedef {import("./overlay.js").Box} Box */
+
+/** @template T @typedef {import("./path.js").Along<T>} Along */
+/** Its title, and what draws it. @typedef {[title: string, draw: () => void]} Plot */
+
+/** @param {number} left @param {number} top @param {number} width @param {number} height @returns {Box} */
+const boxAt = (left, top, width, height) => ({ left, top, right: left + width, bottom: top + height });
+/** The area that two boxes have in common. @param {Box} a @param {Box} b */
+const common = (a, b) =>
+  Math.max(Math.min(a.right, b.right) - Math.max(a.left, b.left), 0) * Math.max(Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top), 0);
+
+/** The shades of a plot, where the picture has no colours of the field. */
+const SHADES = Array.from({ length: 32 }, (_, i) => `hsl(210 25% ${12 + 2.5 * i}%)`);
+
+/** What colours mean in a plot: what they mean in the picture, if they are of the field there. */
+function scale() {
+  const { name, min, max } = shownField();
+  const { legend } = viewer();
+  return legend?.label === name ? legend : { range: /** @type {[number, number]} */ ([min, max]), log: false, colours: SHADES };
+}
+
+/** The field that is plotted. */
+const fieldTitle = () => nameWithUnit(shownField().name, shownField().unit);
 
 /** The point of a probe as it is in links. @param {Probe} probe @returns {Point} */
 function placeOf({ position: [x, y, z] }) {
@@ -34,7 +67,20 @@ function placeOf({ position: [x, y, z] }) {
   return [kept(x), kept(y), kept(z)];
 }
 
+/** What can be done with the part that a probe is in, where there are several. @param {Probe} probe */
+function partButtons({ region }) {
+  if (region === undefined || (volume().regions?.all.length ?? 0) < 2) return [];
+  const button = (/** @type {string} */ words, /** @type {(name: string) => void} */ act) => {
+    const made = element("button", { type: "button", className: "of-part", ariaLabel: `${words}: ${region}` }, words);
+    made.addEventListener("click", () => act(region));
+    return made;
+  };
+  return [button("Hide this part", hideRegion), button("Show it alone", showOnly)];
+}
+
 export class Probes {
+  /** Resolves when what is at the points of the state is read. */
+  read = Promise.resolve();
   #marks = shape("g", { class: "pins" });
   /** What is at the points that are kept, as far as it is read. @type {Probe[]} */
   #pins = [];
@@ -55,7 +101,11 @@ export class Probes {
   constructor() {
     svg("overlay").append(this.#marks);
     page.overlay.follow(() => this.#place());
-    store.subscribe(["probes"], () => this.#follow());
+    store.subscribe(["probes"], () => {
+      this.read = this.#follow();
+    });
+    viewer().addEventListener("legend", () => this.#plot());
+    store.subscribe(["over-time", "field", "time", "unit"], () => this.#show(this.#pins, this.#read));
   }
 
   /** What is at the points that are kept. */
@@ -147,11 +197,10 @@ export class Probes {
     return from && to && this.boxOf(from.position, to.position);
   }
 
-  /** The box between two points. @param {Point} a @param {Point} b */
-  boxOf(a, b) {
+  /** The box around points. @param {Point[]} points */
+  boxOf(...points) {
     const { bounds } = volume();
-    const lower = a.map((x, i) => Math.min(x, b[i]));
-    const upper = a.map((x, i) => Math.max(x, b[i]));
+    const [lower, upper] = [Math.min, Math.max].map((end) => AXES.map((i) => end(...points.map((point) => point[i]))));
     // Points of a section have a coordinate in common: a box needs some height there.
     const least = [0, 1, 2].map((i) => (bounds[i + 3] - bounds[i]) / 20);
     const room = least.map((length, i) => Math.max(0, length - (upper[i] - lower[i])) / 2);
@@ -191,7 +240,7 @@ export class Probes {
   }
 
   /** The position, the values and the tetrahedron of a point, as a list. @param {Probe} found */
-  #list({ position, values, size, error }) {
+  #list({ position, values, size, error, region }) {
     const list = element("dl");
     const byName = new Map([shownField(), ...volume().fields].map((field) => [field.name, field]));
     const fields = [...byName.values()];
@@ -199,8 +248,9 @@ export class Probes {
     describe(list, [
       ...fields.slice(0, MOST_FIELDS).map(({ name, min, max, unit }) => [name, `${rounded(values[name], max - min)} ${unit}`.trim()]),
       ...(fields.length > MOST_FIELDS ? [["", `and ${fields.length - MOST_FIELDS} more fields`]] : []),
-      ["position", position.map((x) => rounded(x, diagonal)).join(", ")],
-      ["cell size", rounded(size, size)],
+      ...(region === undefined ? [] : [["part", region]]),
+      ["position", withUnit(position.map((x) => rounded(x, diagonal)).join(", "))],
+      ["cell size", withUnit(rounded(size, size))],
       ["cell error", `${Number((100 * error).toPrecision(2))} %`],
     ]);
     return list;
@@ -212,68 +262,112 @@ export class Probes {
     const cards = pins.map((pin, i) => {
       const remove = element("button", { type: "button", ariaLabel: `Remove probe ${NAMES[i]}` }, "×");
       remove.addEventListener("click", () => this.#keep(this.#pins.filter((other) => other !== pin)));
-      const hint = pins.length === 1 ? [element("small", {}, "Click at a second point for a plot")] : [];
-      return element("div", { className: "card" }, element("b", {}, `Probe ${NAMES[i]}`), remove, this.#list(pin), ...hint);
+      const hint = i === pins.length - 1 && HINTS[pins.length] ? [element("small", {}, HINTS[pins.length])] : [];
+      return element("div", { className: "card" }, element("b", {}, `Probe ${NAMES[i]}`), remove, this.#list(pin), ...partButtons(pin), ...hint);
     });
+    if (hasTimes()) cards.at(-1)?.append(this.#timeButton());
+    const hadFocus = document.activeElement?.matches(".card .over-time");
     $("cards").replaceChildren(...cards);
+    if (hadFocus) all(".card .over-time")[0]?.focus();
     this.#place();
     this.#plot();
+    refreshMeasures();
+  }
+
+  /** What shows values over time in the place of those along the line, or no longer. */
+  #timeButton() {
+    const isOn = store.state["over-time"] !== "";
+    const made = element("button", { type: "button", className: "over-time", ariaPressed: String(isOn) }, "Plot over time");
+    made.addEventListener("click", () => store.change({ "over-time": isOn ? "" : "1" }));
+    return made;
   }
 
   /** Draws the probes where they are seen now. */
   #place() {
-    const places = this.#pins.map(({ position }) => page.overlay.project(position));
-    const marks = [];
-    const [from, to] = places;
-    if (from && to) {
-      const [[x1, y1], [x2, y2]] = [from, to];
-      marks.push(shape("line", { x1, y1, x2, y2, class: "between" }));
-    }
+    if (this.#pins.length === 0) return this.#marks.replaceChildren();
+    const places = this.#pins.map((pin) => page.overlay.project(drawnAt(pin)));
+    const marks = places.slice(1).flatMap((to, i) => {
+      const from = places[i];
+      return from && to ? [shape("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], class: "between" })] : [];
+    });
     const stage = $("cards");
-    /** @type {{ left: number, top: number, width: number, height: number } | undefined} */
-    let last;
+    /** What a card should not cover: the legend, probes, and cards before it. @type {Box[]} */
+    const taken = [...page.overlay.covered, ...places.flatMap((place) => (place ? [boxAt(place[0] - MARK, place[1] - MARK, 2 * MARK, 2 * MARK)] : []))];
     for (const [i, card] of /** @type {HTMLElement[]} */ ([...stage.children]).entries()) {
       const place = places[i];
       card.hidden = !place;
       if (!place) continue;
       const [x, y] = place;
-      marks.push(shape("circle", { cx: x, cy: y, r: 8 }), shape("text", { x, y: y + 4 }, NAMES[i]));
-      const other = places[1 - i];
-      // On the side that is away from the other probe, if there is room.
-      const wantsRight = other ? x >= other[0] : true;
-      const fitsRight = x + 16 + card.offsetWidth < stage.clientWidth;
-      const fitsLeft = x - 16 - card.offsetWidth > 0;
-      const [width, height] = [card.offsetWidth, card.offsetHeight];
-      const wanted = (wantsRight && fitsRight) || !fitsLeft ? x + 16 : x - 16 - width;
-      // Where neither side has room, as on a phone, it lies over the probe.
-      const left = Math.max(Math.min(wanted, stage.clientWidth - width - 4), 4);
-      const held = (/** @type {number} */ top) => Math.max(Math.min(top, stage.clientHeight - height - 4), 4);
-      let top = held(y - height / 2);
-      if (last && left < last.left + last.width && last.left < left + width && Math.abs(top - last.top) < height) {
-        // Below the card before, or above it where there is more room.
-        const isRoomBelow = last.top + last.height + height < stage.clientHeight - 8;
-        top = held(isRoomBelow ? last.top + last.height + 4 : last.top - height - 4);
-      }
-      card.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
-      last = { left, top, width, height };
+      marks.push(shape("circle", { cx: x, cy: y, r: MARK }), shape("text", { x, y: y + 4 }, NAMES[i]));
+      const { offsetWidth: width, offsetHeight: height } = card;
+      const held = (/** @type {number} */ at, /** @type {number} */ most) => Math.max(Math.min(at, most - 4), 4);
+      const other = places[i === 0 ? 1 : i - 1];
+      const sides = [x + 2 * MARK, x - 2 * MARK - width];
+      // On the side that is away from another probe if it covers nothing there, as it does where there is no room.
+      const candidates = (other && x < other[0] ? sides.reverse() : sides).flatMap((left) =>
+        [y - height / 2, y, y - height].map((top) => boxAt(held(left, stage.clientWidth - width), held(top, stage.clientHeight - height), width, height)),
+      );
+      const covered = (/** @type {Box} */ box) => taken.reduce((sum, one) => sum + common(box, one), 0);
+      const [best] = candidates.sort((one, other) => covered(one) - covered(other));
+      card.style.transform = `translate(${Math.round(best.left)}px, ${Math.round(best.top)}px)`;
+      taken.push(best);
     }
     this.#marks.replaceChildren(...marks);
   }
 
+  /** Shows what is plotted of the probes, if there is anything to plot. */
   async #plot() {
     const mine = ++this.#plotted;
-    const [from, to] = this.#pins.map(({ position }) => position);
-    $("plot").hidden = !to;
-    if (!to) return;
-    const { name, unit } = shownField();
-    const profile = await viewer().line(from, to);
-    if (mine !== this.#plotted) return;
-    const length = Math.hypot(...from.map((x, i) => to[i] - x));
-    $("plot-title").textContent = `${unit ? `${name} in ${unit}` : name} from A to B`;
-    const draw = () => linePlot(svg("plot-area"), profile, { length, label: "distance from A" });
-    draw();
+    const pins = this.#pins;
+    const kind = plotOf(pins.length);
+    const isShown = demo.info !== undefined && (pins.length > 1 || (pins.length === 1 && kind !== ""));
+    $("plot").hidden = !isShown;
+    $("box-of-pins").hidden = pins.length < 2;
+    $("over-time").hidden = !hasTimes();
+    for (const option of select("over-time").options) option.disabled = option.value === "line" && pins.length < 2;
     this.#watch?.disconnect();
+    if (!isShown) return;
+    // What is plotted of one probe is not what was chosen for two.
+    select("over-time").value = kind;
+    const legs = legsOf(pins.map(({ position }) => position));
+    /** @type {[now: Awaited<ReturnType<typeof alongNow>>, always: Awaited<ReturnType<typeof alongAlways>>]} */
+    const places = [kind === "" ? await alongNow(legs) : [], kind === "line" ? await alongAlways(legs) : []];
+    if (mine !== this.#plotted || !demo.info) return;
+    const [words, draw] = kind === "1" ? this.#overTime() : along(legs, ...places);
+    $("plot-title").textContent = words;
+    draw();
     this.#watch = new ResizeObserver(draw);
     this.#watch.observe(svg("plot-area"));
   }
+
+  /** The values at the probes over time. @returns {Plot} */
+  #overTime() {
+    const { profiles, now, ...ends } = curvesOverTime(this.#pins);
+    const names = NAMES.slice(0, profiles.length);
+    const title = `${fieldTitle()} over time at ${names.join(", ").replace(/, (?=.$)/, " and ")}`;
+    const how = { ...ends, label: "time", marks: /** @type {[number, string][]} */ ([[now, ""]]), names: names.length > 1 ? names : [] };
+    return [title, () => linePlot(svg("plot-area"), profiles, how)];
+  }
+}
+
+/**
+ * The values on the way from probe to probe, now or at all times: whichever there are.
+ *
+ * @param {import("./path.js").Leg[]} legs @param {Along<number>[]} now @param {Along<number[] | undefined>[]} always @returns {Plot}
+ */
+function along(legs, now, always) {
+  const [length, angle] = [lengthOf(legs), angleOf(legs)];
+  const far = withUnit(rounded(length, length));
+  const way = legs.length === 1 ? `from A to B, ${far} apart` : `from A over B to C, ${far} long${angle === undefined ? "" : `, ${degrees(angle)} at B`}`;
+  const title = `${fieldTitle()} ${way}`;
+  const marks = legs.slice(1).map(({ start }) => /** @type {[number, string]} */ ([start / length, "B"]));
+  const how = { to: length, label: nameWithUnit("distance from A"), marks };
+  const at = [...now, ...always].map(({ distance }) => distance / (length || 1));
+  if (always.length === 0) {
+    const profile = { at, values: now.map(({ value }) => value) };
+    return [title, () => linePlot(svg("plot-area"), [profile], how)];
+  }
+  const grid = { at, ...rowsOverTime(always.map(({ value }) => value)) };
+  const look = { ...how, step: store.state.time, scale: scale() };
+  return [`${title}, at all times`, () => heatPlot(svg("plot-area"), grid, look)];
 }

@@ -1,27 +1,27 @@
-/** The region of the request: a box with handles, the sphere in it, or the side of the clip plane that is shown. */
+/** The region of the request: a box with handles, the sphere in it, or the clip planes. */
 
 import { $, all } from "./dom.js";
 import { diagonalOf, precise } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
-import { plane } from "./planes.js";
+import { planes } from "./planes.js";
 import { store } from "./state.js";
 import { AXES, boxOf } from "./volume.js";
 
 /** @typedef {import("./volume.js").Box} Box */
 
-/** What the request says of it. @returns {Partial<Pick<import("tetralod/viewer").ViewerRefineOptions, "box" | "sphere" | "slab">>} */
-export function region() {
+/** What the request says of it: one or several, all of which are refined. @returns {Partial<Pick<import("tetralod/viewer").ViewerRefineOptions, "box" | "sphere" | "slab">>[]} */
+export function areas() {
   const { box } = store.state;
   switch (store.state.region) {
     case "box":
-      return { box };
+      return [{ box }];
     case "sphere":
-      return { sphere: sphereIn(box) };
+      return [{ sphere: sphereIn(box) }];
     case "cut":
-      return { slab: plane() };
+      return planes().map((slab) => ({ slab }));
     default:
-      return {};
+      return [{}];
   }
 }
 

@@ -4,14 +4,15 @@ import { $, all, input, named, text } from "./dom.js";
 import { followingStep, isovalue, shownField } from "./fields.js";
 import { count, percentage, pixels } from "./format.js";
 import { fail } from "./messages.js";
+import { needsOverTime } from "./overtime.js";
 import { demo, viewer } from "./page.js";
-import { region } from "./region.js";
+import { areas } from "./region.js";
 import { FIRST, store } from "./state.js";
 
 /** What the request is made of. */
 const ASKED = /** @type {const} */ ([
   ...["refine", "error", "outside", "pixels", "budget", "focus", "isovalue", "field", "time"],
-  ...["region", "box", "view", "places", "axis", "flip"],
+  ...["region", "box", "view", "planes", "threshold", "over-time", "probes"],
 ]);
 
 /** Which place the slider of errors shows. */
@@ -22,7 +23,7 @@ const percentAt = (at) => (at === 0 ? 0 : 10 ** (-2 + (4 * at) / 100));
 const errorPercent = () => percentAt(store.state[place()]);
 
 /** With these words less may be asked for than an error everywhere. */
-const SHAPING = ["refine", "budget", "focus", "region", "field", "time"];
+const SHAPING = ["refine", "budget", "focus", "region", "field", "time", "hidden", "threshold"];
 /** A mesh within this error (in %) shows what a volume is, and is there much sooner than a fine one. */
 const COARSE = 5;
 
@@ -74,8 +75,14 @@ function options() {
   // The step that comes next is refined with the one that is shown, so that it is there when it is shown.
   const following = followingStep();
   if (following !== undefined) needs.push({ error, field: following });
-  const isovalues = store.state.focus ? { isovalues: [isovalue()] } : {};
-  return { error, field: shownField().number, maxTets: budget(), ...region(), ...isovalues, ...(needs.length > 0 ? { needs } : {}) };
+  needs.push(...needsOverTime(error));
+  const { focus, threshold } = store.state;
+  // What no cell that is shown can have is not refined.
+  const values = focus ? { isovalues: [isovalue()] } : threshold ? { ranges: [threshold] } : {};
+  const field = shownField().number;
+  const [where, ...others] = areas();
+  needs.push(...others.map((other) => ({ error, field, ...other, ...values })));
+  return { error, field, maxTets: budget(), ...where, ...values, ...(needs.length > 0 ? { needs } : {}) };
 }
 
 /** The mesh that was requested last. @type {Promise<unknown>} */

@@ -1,17 +1,23 @@
 /** What is drawn: the view and what is beside it, the plane, colours, and the colour bar. */
 
+import { averagedNote } from "./averaged.js";
 import { colours, gradient } from "./colours.js";
 import { comparison } from "./compare.js";
 import { pointsOf } from "./curve.js";
+import { deformation } from "./deform.js";
 import { $, element, text } from "./dom.js";
+import { refreshExtremes } from "./extremes.js";
 import { isovalue, isovaluePart, shownField } from "./fields.js";
-import { flowIsByField, flowScene, flowUnit, seedQuad } from "./flow.js";
+import { flowIsByField, flowScene, flowUnit } from "./flow.js";
+import { nameWithUnit } from "./lengths.js";
 import { fail } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
 import { beside, hasEdges, mode, opacityOf, shows } from "./parts.js";
-import { plane } from "./planes.js";
+import { planes } from "./planes.js";
+import { isByRegion, shownRegions } from "./regions.js";
 import { store } from "./state.js";
 import { background } from "./theme.js";
+import { threshold } from "./threshold.js";
 import { rangeOf } from "./volume.js";
 
 /** @typedef {import("tetralod/viewer").SceneState} SceneState */
@@ -19,9 +25,40 @@ import { rangeOf } from "./volume.js";
 
 /** What of the state the scene is made of. */
 export const LOOKS = /** @type {const} */ ([
-  ...["view", "also", "opacities", "edges", "field", "time", "surface-colour", "vector", "isovalue", "places", "axis", "flip"],
-  ...["shape", "shrink", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "seeds", "transfer", "map", "reversed"],
-  ...["range", "log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
+  ...[
+    "view",
+    "also",
+    "opacities",
+    "edges",
+    "field",
+    "time",
+    "surface-colour",
+    "vector",
+    "deform",
+    "times",
+    "undeformed",
+    "swinging",
+    "isovalue",
+    "planes",
+    "plane",
+  ],
+  ...[
+    "shape",
+    "shrink",
+    "colour-by",
+    "boundary-colour",
+    "hidden",
+    "flow-colour",
+    "rake",
+    "arrows",
+    "flow-boundary",
+    "seeds",
+    "transfer",
+    "map",
+    "reversed",
+    "bands",
+  ],
+  ...["range", "threshold", "log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
 ]);
 
 /** The surface of the domain around other parts. */
@@ -33,7 +70,7 @@ const THIN = 0.7;
 const colourBy = () => /** @type {CellState["colourBy"]} */ (store.state["colour-by"]);
 
 /** Cells beside other parts: those in front of a plane that is looked at would hide it. */
-const cellsBeside = () => ({ width: THIN, colourBy: colourBy(), ...(mode() === "slice" ? { cut: plane() } : {}) });
+const cellsBeside = () => ({ width: THIN, colourBy: colourBy(), ...(mode() === "slice" ? { cut: planes()[0] } : {}) });
 
 /** The opacities of the values of the field that is shown. @returns {[value: number, opacity: number][]} */
 function opacities() {
@@ -48,14 +85,16 @@ const PARTS = {
     return { isosurfaces: [{ value: isovalue(), opacity: opacityOf("iso"), edges: hasEdges("iso"), ...(by ? { field: by } : {}) }] };
   },
   volume: () => ({ volume: { opacities: opacities() } }),
-  slice: () => ({ slices: [{ ...plane(), opacity: opacityOf("slice"), edges: hasEdges("slice") }] }),
+  slice: () => ({ slices: planes().map((plane) => ({ ...plane, opacity: opacityOf("slice"), edges: hasEdges("slice") })) }),
   solid() {
     if (mode() !== "solid") return { boundary: SHELL };
-    return { boundary: { opacity: opacityOf("solid"), edges: hasEdges("solid") }, clips: [plane()] };
+    const colourBy = isByRegion() ? { colourBy: /** @type {const} */ ("region") } : {};
+    return { boundary: { opacity: opacityOf("solid"), edges: hasEdges("solid"), ...colourBy }, clips: planes() };
   },
   mesh() {
     const shape = /** @type {CellState["shape"]} */ (store.state.shape);
-    return { cells: { shape, shrink: store.state.shrink / 100, cut: plane(), colourBy: colourBy(), edges: hasEdges("mesh") } };
+    const [cut, ...clips] = planes();
+    return { cells: { shape, shrink: store.state.shrink / 100, cut, colourBy: colourBy(), edges: hasEdges("mesh") }, clips };
   },
   wires: () => ({ cells: { shape: "wire", ...cellsBeside() } }),
   points: () => ({ cells: { shape: "points", ...cellsBeside() } }),
@@ -68,6 +107,7 @@ function isByField() {
   /** @type {Record<string, boolean>} */
   const is = { iso: store.state["surface-colour"] === store.state.field, mesh: cells, wires: cells, points: cells, flow: flowIsByField() };
   // Around other parts, the boundary has a colour of its own.
+  if (mode() === "solid" && isByRegion()) return false;
   return is[mode()] ?? (["volume", "slice", "solid"].includes(mode()) || beside().some((name) => is[name] ?? name !== "solid"));
 }
 
@@ -77,16 +117,25 @@ export function draw() {
   const { shrink, shade, outline, "surface-colour": by } = store.state;
   text("shrink", `${shrink} %`);
   text("shade", `${shade} %`);
-  $("colours").hidden = mode() === "iso" && !by && !beside().some((name) => name !== "solid");
+  const isPlain = (mode() === "iso" && !by) || (mode() === "solid" && isByRegion());
+  $("colours").hidden = isPlain && !beside().some((name) => name !== "solid");
   $("range").hidden = !isByField();
-  page.overlay.quad = mode() === "flow" ? seedQuad() : undefined;
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [], streamlines: null, arrows: null };
   const parts = [...beside(), mode()].map((name) => PARTS[name]());
   const compare = comparison();
   // A difference has values on both sides of 0.
   const diverging = compare?.difference ? { map: "coolwarm" } : {};
   const range = shows("iso") && by && !isByField() ? { range: ownRange(by) } : {};
-  const looks = { colours: { ...colours(), ...range, ...diverging }, background: background(), compare, outline, shade: shade / 100 };
+  const looks = {
+    regions: shownRegions(),
+    threshold: threshold(),
+    colours: { ...colours(), ...range, ...diverging },
+    background: background(),
+    compare,
+    deform: deformation(),
+    outline,
+    shade: shade / 100,
+  };
   viewer()
     .set(Object.assign(nothing, ...parts, looks))
     .catch(fail);
@@ -104,8 +153,7 @@ export function showLegend(legend) {
   $("legend").hidden = !legend;
   if (!legend) return page.overlay.refresh();
   const { label, ticks } = legend;
-  const unit = unitOf(label);
-  $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
+  $("legend-name").textContent = nameWithUnit(label, unitOf(label));
   if (demo.info && label === store.state.field) $("transfer-bar").style.background = gradient(legend);
   $("legend-bar").dataset.colours = legend.colours.join(" ");
   $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
@@ -114,6 +162,10 @@ export function showLegend(legend) {
   const shown = [...ticks.filter(isEnd), ...ticks.filter((tick) => !isEnd(tick))].map(tickElement);
   $("legend-ticks").replaceChildren(...shown);
   leaveOutOverlaps(shown);
+  const note = averagedNote(demo.info?.fields.filter(({ name }) => name === label) ?? []);
+  $("legend-note").replaceChildren(...note.map((textContent) => element("span", { textContent })));
+  $("legend-note").hidden = note.length === 0;
+  refreshExtremes();
   page.overlay.refresh();
 }
 

@@ -9,7 +9,7 @@ import { $, named } from "./dom.js";
 import { precise } from "./format.js";
 import { demo, page, volume } from "./page.js";
 import { Store } from "./store.js";
-import { fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js";
+import { AXES, fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js";
 
 /** @typedef {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} Mode */
 /** @typedef {import("tetralod/viewer").CameraState} Camera */
@@ -17,11 +17,18 @@ import { fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js";
 /** The values of the first and the last colour. @typedef {"data" | "percentiles" | "symmetric" | [low: number, high: number]} Range */
 /** @typedef {Record<string, string>} Words */
 
+/**
+ * A plane: its normal, of any length; whether it hides the lower side, and not that which the normal points to; its places as one that cuts
+ * and as one that is looked at, in thousandths of the model along the normal.
+ *
+ * @typedef {{ normal: Point, flip: boolean, cut: number, section: number }} Plane
+ */
+
 /** Controls that have a value of their own: they are bound to it by their ids. Those that compare meshes have no entry. */
 const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
-  ["outline", "inside", "arrows", "flow-boundary", "reversed", "log", "flip", "focus", "axes", "fly", "freeze", "difference"],
+  ["outline", "undeformed", "inside", "arrows", "flow-boundary", "reversed", "log", "extremes", "handle", "focus", "axes", "fly", "freeze", "difference"],
   ["shrink", "shade", "rake", "pixels", "budget", "frame-time", "split"],
-  ["shape", "colour-by", "flow-colour", "map", "axis", "region", "background", "surface-colour", "vector"],
+  ["shape", "colour-by", "boundary-colour", "flow-colour", "map", "bands", "region", "background", "surface-colour", "vector", "deform", "over-time", "unit"],
 ]);
 
 /**
@@ -33,13 +40,17 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
  * @property {string} field
  * @property {number} time its step
  * @property {number | undefined} isovalue in units of the field; that which is shown first without it
- * @property {{ cut: number, section: number }} places of the planes, in thousandths of the model's length
+ * @property {number | undefined} times how many times the vector that deforms; what is automatic without it
+ * @property {readonly Plane[]} planes that cut away, or are looked at
+ * @property {number} plane the number of the one that is chosen
  * @property {"field" | "view"} refine
  * @property {number} error where its slider is
  * @property {number} outside where that is by screen error: then it applies outside of the view, and may be coarser
  * @property {import("./volume.js").Box} box
  * @property {Range} range
+ * @property {[low: number, high: number] | undefined} threshold the values of the cells that are shown; all without it
  * @property {import("./curve.js").Curve} transfer
+ * @property {readonly number[]} hidden the places of regions, in the list of the volume, that are not shown
  * @property {readonly Point[]} seeds that were placed by clicks
  * @property {readonly Point[]} probes
  * @property {Camera | undefined} camera that with which the volume is shown first without it
@@ -47,7 +58,7 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
 
 /**
  * @typedef {Record<(typeof FLAGS)[number], boolean> & Record<(typeof SLIDERS)[number], number> & Record<(typeof CHOICES)[number], string>
- *   & Others & { playing: boolean, dark: boolean, kept: boolean }} State
+ *   & Others & { playing: boolean, swinging: boolean, dark: boolean, kept: boolean }} State
  */
 
 /** Words of the address: `get` gives none for what there is first, `set` never gets none and tells whether they mean something. */
@@ -56,7 +67,7 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
 /** What a volume is shown in first: what fills its box as an isosurface, all else by its boundary. @returns {Mode} */
 const firstView = () => (demo.info?.isBox === false ? "solid" : "iso");
 /** Nothing is cut off a boundary that is shown first. */
-const firstCut = () => (firstView() === "solid" ? (loaded.flip ? 0 : 1000) : MIDDLE);
+const firstCut = () => (firstView() === "solid" ? 0 : MIDDLE);
 
 /** Parts that have an opacity, in the order that links have. */
 const SHEER = ["iso", "volume", "slice", "solid"];
@@ -67,6 +78,7 @@ const firstEdges = () => ({ ...EDGES, solid: firstView() !== "solid" });
 const OPAQUE = 100;
 /** Of planes, in thousandths of the model's length. */
 export const MIDDLE = 500;
+export const MOST_PLANES = 6;
 /** Digits of numbers of the camera; those of the mesh's request have fewer, and are rounded before they are used. */
 const CAMERA_DIGITS = 9;
 
@@ -87,7 +99,7 @@ const bound = [...FLAGS, ...SLIDERS, ...CHOICES].map((id) => ({ id, element: /**
 
 /** @param {HTMLInputElement | HTMLSelectElement} element */
 function taken(element) {
-  if (element instanceof HTMLSelectElement) return element.value;
+  if (element instanceof HTMLSelectElement || element.type === "text") return element.value;
   return element.type === "checkbox" ? element.checked : element.valueAsNumber;
 }
 
@@ -110,14 +122,24 @@ function control(id) {
     set(given, draft) {
       put(probe, typeof loaded[id] === "boolean" ? given === "1" : given);
       // What the control does not take would leave it empty, or at another value.
-      if (words(taken(probe)) !== given) return false;
+      if (words(taken(probe)) !== given || !probe.checkValidity()) return false;
       Object.assign(draft, { [id]: taken(probe) });
       return true;
     },
   };
 }
 
-/** A name from a list that the volume has, the default is its first. @param {"field" | "surface-colour" | "vector"} id @param {() => string[]} names @returns {Entry} */
+/** A number, if there is one. @param {"times" | "isovalue"} id @returns {Entry} */
+const number = (id) => ({
+  get: (state) => String(state[id] ?? ""),
+  set(words, draft) {
+    const isOne = isNumbers(words, 1);
+    if (isOne) draft[id] = Number(words);
+    return isOne;
+  },
+});
+
+/** A name from a list that the volume has, the default is its first. @param {"field" | "surface-colour" | "vector" | "deform"} id @param {() => string[]} names @returns {Entry} */
 const list = (id, names) => ({
   get: (state) => (state[id] === names()[0] ? "" : state[id]),
   set(words, draft) {
@@ -134,6 +156,7 @@ function firstFields() {
 
 const colourNames = () => ["", ...fieldNames()];
 const vectorNames = () => [...vectors().keys(), ""];
+const deformNames = () => ["", ...vectors().keys()];
 
 /** A choice of radio buttons. @param {"view" | "refine"} id @param {string} name @param {() => string} first @returns {Entry} */
 const radios = (id, name, first) => ({
@@ -158,18 +181,36 @@ const errorPlace = (id) => ({
 /** Whether the plane of a view is one to look at, and cuts nothing away. @param {Readonly<Pick<State, "view">>} state */
 export const isSection = ({ view }) => view === "slice" || view === "flow";
 
-/** The place of the view's plane, or of the other one. @param {boolean} isOther @returns {Entry} */
+/** Whether a direction is that of an axis. @param {Point} normal @param {number} axis */
+export const isAxis = (normal, axis) => normal.every((x, i) => x === Number(i === axis));
+
+/** Changes the first plane, which has words of its own: links of before have no other. @param {State} draft @param {Partial<Plane>} values */
+function changeFirst(draft, values) {
+  draft.planes = [{ ...draft.planes[0], ...values }, ...draft.planes.slice(1)];
+  return true;
+}
+
+const isPlace = (/** @type {number} */ place) => place >= 0 && place <= 1000;
+const isNormal = (/** @type {number[]} */ normal) => normal.length === 3 && normal.every(Number.isFinite) && normal.some((x) => x !== 0);
+
+/** The place of the first plane in the view, or the other one. @param {boolean} isOther @returns {Entry} */
 function place(isOther) {
   /** @param {Readonly<State>} state */
-  const plane = (state) => (isSection(state) !== isOther ? "section" : "cut");
-  const first = (/** @type {"cut" | "section"} */ plane) => (plane === "cut" ? firstCut() : MIDDLE);
+  const which = (state) => (isSection(state) !== isOther ? "section" : "cut");
+  const first = (/** @type {"cut" | "section"} */ which) => (which === "cut" ? firstCut() : MIDDLE);
   return {
-    get: (state) => (state.places[plane(state)] === first(plane(state)) ? "" : String(state.places[plane(state)])),
-    set(words, draft) {
-      if (Number(words) >= 0 && Number(words) <= 1000) draft.places = { ...draft.places, [plane(draft)]: Number(words) };
-      return true;
-    },
+    get: (state) => (state.planes[0][which(state)] === first(which(state)) ? "" : String(state.planes[0][which(state)])),
+    set: (words, draft) => !isPlace(Number(words)) || changeFirst(draft, { [which(draft)]: Number(words) }),
   };
+}
+
+/** A plane other than the first: its normal, its side and its places. */
+const PLANE_NUMBERS = 6;
+const planeWords = (/** @type {Plane} */ { normal, flip, cut, section }) => String([...normal, Number(flip), cut, section]);
+/** @param {number[]} numbers @returns {Plane[]} */
+function planeOf([x, y, z, side, cut, section]) {
+  const isPlane = isNormal([x, y, z]) && (side === 0 || side === 1) && isPlace(cut) && isPlace(section);
+  return isPlane ? [{ normal: [x, y, z], flip: side === 1, cut, section }] : [];
 }
 
 /** Points of the model. @param {"seeds" | "probes"} id @returns {Entry} */
@@ -227,14 +268,10 @@ const ENTRIES = {
   field: list("field", firstFields),
   "surface-colour": list("surface-colour", colourNames),
   vector: list("vector", vectorNames),
-  isovalue: {
-    get: ({ isovalue }) => String(isovalue ?? ""),
-    set(words, draft) {
-      const isOne = isNumbers(words, 1);
-      if (isOne) draft.isovalue = Number(words);
-      return isOne;
-    },
-  },
+  deform: list("deform", deformNames),
+  times: number("times"),
+  undeformed: control("undeformed"),
+  isovalue: number("isovalue"),
   cut: place(false),
   "other-cut": place(true),
   shape: control("shape"),
@@ -243,6 +280,7 @@ const ENTRIES = {
   shade: control("shade"),
   inside: control("inside"),
   "colour-by": control("colour-by"),
+  "boundary-colour": control("boundary-colour"),
   "flow-colour": control("flow-colour"),
   rake: control("rake"),
   arrows: control("arrows"),
@@ -250,14 +288,49 @@ const ENTRIES = {
   map: control("map"),
   reversed: control("reversed"),
   log: control("log"),
-  axis: control("axis"),
-  flip: control("flip"),
+  bands: control("bands"),
+  extremes: control("extremes"),
+  axis: {
+    get: ({ planes: [{ normal }] }) => String([0, 2].find((axis) => isAxis(normal, axis)) ?? ""),
+    set: (words, draft) => /^[012]$/.test(words) && changeFirst(draft, { normal: [Number(words === "0"), Number(words === "1"), Number(words === "2")] }),
+  },
+  normal: {
+    get: ({ planes: [{ normal }] }) => (AXES.some((axis) => isAxis(normal, axis)) ? "" : String(normal)),
+    set(words, draft) {
+      const [x, y, z, ...rest] = numbers(words);
+      return isNormal([x, y, z]) && rest.length === 0 && changeFirst(draft, { normal: [x, y, z] });
+    },
+  },
+  flip: {
+    get: ({ planes: [{ flip }] }) => (flip ? "" : "0"),
+    set: (words, draft) => /^[01]$/.test(words) && changeFirst(draft, { flip: words === "1" }),
+  },
+  planes: {
+    get: ({ planes: [, ...others] }) => others.map(planeWords).join(),
+    set(words, draft) {
+      const all = numbers(words);
+      const count = Math.min(Math.ceil(all.length / PLANE_NUMBERS), MOST_PLANES - 1);
+      const others = Array.from({ length: count }, (_, i) => planeOf(all.slice(i * PLANE_NUMBERS, (i + 1) * PLANE_NUMBERS))).flat();
+      draft.planes = [draft.planes[0], ...others];
+      return others.length * PLANE_NUMBERS === all.length;
+    },
+  },
+  plane: {
+    get: ({ plane }) => (plane === 0 ? "" : String(plane + 1)),
+    set(words, draft) {
+      const isOne = draft.planes[Number(words) - 1] !== undefined;
+      if (isOne) draft.plane = Number(words) - 1;
+      return isOne;
+    },
+  },
+  handle: control("handle"),
   pixels: control("pixels"),
   budget: control("budget"),
   region: control("region"),
   focus: control("focus"),
   background: control("background"),
   axes: control("axes"),
+  unit: control("unit"),
   fly: control("fly"),
   "frame-time": control("frame-time"),
   time: {
@@ -288,6 +361,14 @@ const ENTRIES = {
       return draft.range !== "data";
     },
   },
+  threshold: {
+    get: ({ threshold }) => String(threshold ?? ""),
+    set(words, draft) {
+      const [low, high] = numbers(words);
+      if (isNumbers(words, 2) && low <= high) draft.threshold = [low, high];
+      return draft.threshold !== undefined;
+    },
+  },
   transfer: {
     get: ({ transfer }) => curveWords(transfer),
     set(words, draft) {
@@ -295,8 +376,24 @@ const ENTRIES = {
       return true;
     },
   },
+  hidden: {
+    // Runs of numbers: "0-3,7".
+    get({ hidden }) {
+      const starts = hidden.filter((number, i) => hidden[i - 1] !== number - 1);
+      const ends = hidden.filter((number, i) => hidden[i + 1] !== number + 1);
+      return starts.map((start, i) => (start === ends[i] ? start : `${start}-${ends[i]}`)).join();
+    },
+    set(words, draft) {
+      const count = demo.info?.regions?.all.length ?? 0;
+      const runs = words.split(",").map((run) => /^(\d+)(?:-(\d+))?$/.exec(run));
+      const isIn = (/** @type {number} */ number) => runs.some((run) => run && number >= Number(run[1]) && number <= Number(run[2] ?? run[1]));
+      draft.hidden = Array.from({ length: count }, (_, number) => number).filter(isIn);
+      return draft.hidden.length > 0 && runs.every((run) => run && Number(run[2] ?? run[1]) < count);
+    },
+  },
   seeds: places("seeds"),
   probes: places("probes"),
+  "over-time": control("over-time"),
   camera: {
     get: ({ camera }) => (camera && !(page.home && cameraWords(camera) === cameraWords(page.home)) ? cameraWords(camera) : ""),
     set(words, draft) {
@@ -318,12 +415,16 @@ export const FIRST = {
   edges: EDGES,
   time: 0,
   isovalue: undefined,
-  places: { cut: MIDDLE, section: MIDDLE },
+  times: undefined,
+  planes: /** @type {readonly Plane[]} */ ([{ normal: [0, 1, 0], flip: true, cut: MIDDLE, section: MIDDLE }]),
+  plane: 0,
   refine: "field",
   error: 50,
   outside: 78,
   range: "data",
+  threshold: undefined,
   transfer: curveOf(""),
+  hidden: [],
   seeds: [],
   probes: [],
   camera: undefined,
@@ -331,7 +432,7 @@ export const FIRST = {
 
 /** The one that the page has. @type {Store<State>} */
 export const store = new Store(
-  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", box: [0, 0, 0, 1, 1, 1], playing: false, dark: true, kept: false }),
+  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", box: [0, 0, 0, 1, 1, 1], playing: false, swinging: false, dark: true, kept: false }),
   settled,
 );
 
@@ -340,7 +441,7 @@ function first() {
   const { freeze, difference, split } = store.state;
   const own = {
     view: firstView(),
-    places: { ...FIRST.places, cut: firstCut() },
+    planes: [{ ...FIRST.planes[0], cut: firstCut() }],
     edges: firstEdges(),
     field: firstFields()[0],
     vector: vectorNames()[0],
@@ -375,7 +476,7 @@ export function words() {
 
 /** What stays when another volume takes the place of one: all that has no place in its model. */
 export function carriedOver() {
-  const { camera, box, seeds, probes, time, ...rest } = words();
+  const { camera, box, hidden, seeds, probes, time, unit, ...rest } = words();
   return rest;
 }
 

@@ -29,17 +29,17 @@ export function rangeOf(name) {
   return [Math.min(...steps.map(({ min }) => min)), Math.max(...steps.map(({ max }) => max))];
 }
 
-/** The vectors of three components: the names of the fields that these are, by the name of the vector. */
+/** The vectors of three components: the names of the fields that these are, by the name of the vector. Tensors have more. */
 export function vectors() {
   /** @type {Map<string, string[]>} */
   const found = new Map();
   for (const { name, vector } of volume().fields) {
-    if (typeof vector?.component !== "number" || vector.component > 2) continue;
+    if (typeof vector?.component !== "number") continue;
     const components = found.get(vector.name) ?? [];
     components[vector.component] = name;
     found.set(vector.name, components);
   }
-  const whole = [...found].filter(([, components]) => AXES.every((i) => components[i]));
+  const whole = [...found].filter(([, components]) => components.length === 3 && AXES.every((i) => components[i]));
   return new Map(/** @type {[string, [string, string, string]][]} */ (whole));
 }
 

@@ -314,7 +314,7 @@ export function coloursOf(values, { range, log, colours }) {
   return found;
 }
 
-/** Comma-separated values. Numbers that are missing are empty. @param {(string | number | undefined)[][]} rows @returns {BlobPart[]} */
+/** Comma-separated values. Numbers that are missing are empty. @param {(string | number | undefined)[][]} rows @returns {[string]} */
 export function csv(rows) {
   const cell = (/** @type {string | number | undefined} */ value) =>
     typeof value === "string" ? (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value) : (value ?? "");

@@ -12,11 +12,12 @@ use super::output::Verbosity;
 use super::progress::with_progress;
 use super::remedies::failed;
 use super::restrictions::Angles;
-use super::{files, input, parse, parts};
+use super::{extremes, files, input, parse, parts};
 use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::mesh::TetMesh;
+use tetralod::mt::MultiTessellation;
 use tetralod_build::{BuildConfig, BuildCriterion, BuildResult};
 use tetralod_io::PieceCounts;
 
@@ -115,10 +116,13 @@ fn finish(
         method: config.construction.method().name(),
         criterion: config.construction.criterion().map(BuildCriterion::name),
         counts: summary,
+        regions: (!config.preserve.is_empty()).then(|| mt.regions().map_or(0, |regions| regions.all.len())),
         interface_deviation: (config.preserve_within > 0.0).then_some(summary.interface_deviation),
         file_bytes,
         bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
         seconds: start.elapsed().as_secs_f64(),
+        averaged: mt.info().averaged_fields(),
+        size: extremes::size(mt.info()),
         ..known
     };
     verbosity.print(&report, &rows(output, &report))

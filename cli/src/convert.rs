@@ -40,6 +40,9 @@ struct Report {
     file_bytes: u64,
     bytes_per_vertex: f64,
     memory_bytes: u64,
+    /// How many regions the file has not any more, since its kind has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regions_left_out: Option<usize>,
     seconds: f64,
 }
 
@@ -49,6 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     files::check_output(&arguments.output, [&arguments.file])?;
     let mut opened = files::open_mt(&arguments.file)?;
     let from = opened.info()?.kind;
+    let regions = opened.mt()?.regions().map(|regions| regions.all.len());
     let converted = opened.mt()?.convert(arguments.kind);
     let hint = |error| match error {
         ConvertError::Kinds { to, .. } => anyhow!("{error}, with `tetralod build --kind {}`", to.name()),
@@ -73,9 +77,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         file_bytes,
         bytes_per_vertex: file_bytes as f64 / f64::from(info.vertices.max(1)),
         memory_bytes: mt.bytes(),
+        regions_left_out: regions.filter(|_| mt.regions().is_none()),
         seconds: start.elapsed().as_secs_f64(),
     };
-    let rows = [
+    let mut rows = vec![
         ("file", arguments.output.display().to_string()),
         ("kind", format!("{}, was {}", report.kind, report.from)),
         ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
@@ -85,5 +90,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ("in memory", output::bytes(report.memory_bytes)),
         ("time", format!("{:.2} s", report.seconds)),
     ];
+    if let Some(count) = report.regions_left_out {
+        rows.push((
+            "left out",
+            format!("{} regions: only kind half-edge has them", output::count(count as u32)),
+        ));
+    }
     arguments.verbosity.print(&report, &rows)
 }

@@ -1,12 +1,13 @@
 //! `tetralod extract`: the mesh that a request needs, out of an MT file.
 
+use super::deform::{Deform, Displaced};
 use super::query::{Answer, EXAMPLES, Query};
 use super::{files, input, npz, output};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use tetralod::mesh::{Field, TetMesh};
-use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo};
+use tetralod::mesh::{Field, NONE, TetMesh};
+use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo, Regions};
 use tetralod::refine;
 use tetralod::session::Session;
 use tetralod_build::measure::{Part, Promise, Reference, deviation};
@@ -23,6 +24,8 @@ pub struct Arguments {
     /// Compare with the mesh that the MT was built from, where regions and values (or nothing) say that the field matters.
     #[arg(long, value_name = "INPUT")]
     measure: Option<PathBuf>,
+    #[command(flatten)]
+    deform: Deform,
 }
 
 /// The result as programs get it. Errors are in units of the field, relative ones as fractions of its range.
@@ -30,7 +33,12 @@ pub struct Arguments {
 struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     measured_error: Option<f64>,
+    /// What is in the file: less than the mesh where regions are asked for.
+    vertices_written: usize,
+    tetrahedra_written: usize,
     hash: String,
+    #[serde(flatten)]
+    displaced: Option<Displaced>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -40,12 +48,24 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let inputs = arguments.measure.iter().chain(arguments.query.files());
     files::check_output(&arguments.output, inputs)?;
-    let answer = arguments.query.answer_exactly()?;
+    let mut answer = arguments.query.answer_exactly()?;
+    // What is shown is known once it has been looked at.
+    answer.opened.session.view();
     let opened = &answer.opened;
     let input = arguments.measure.as_deref();
     let measured = input.map(|input| measure(input, &answer)).transpose()?.flatten();
     let mesh = opened.session.mesh().context("there is no mesh")?;
-    let mesh = reference_units(&opened.session, opened.info()?, mesh);
+    let regions = opened.session.regions();
+    let mut mesh = reference_units(&opened.session, opened.info()?, mesh, regions);
+    let (deformation, displaced) = arguments.deform.of(&arguments.query, &answer)?.unzip();
+    if let Some(deformation) = deformation {
+        let components = deformation.fields.map(|field| mesh.fields[field].values.as_slice());
+        mesh.positions = deformation.moved(&mesh.positions, components);
+    }
+    let written = answer.written_fields()?;
+    let is_written: Vec<bool> =
+        (0..mesh.fields.len()).map(|f| written.iter().any(|(field, _)| *field == f)).collect();
+    keep(&mut mesh.fields, &is_written);
     if is_npz {
         npz::write_mesh(&mesh, &arguments.output)?;
     } else {
@@ -53,11 +73,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let report = Report {
         measured_error: measured.as_ref().map(|measured| measured.error),
+        vertices_written: mesh.positions.len(),
+        tetrahedra_written: mesh.tets.len(),
         hash: format!("{:016x}", opened.session.hash()),
+        displaced,
     };
     let mut after = vec![("hash", report.hash.clone())];
+    after.extend(report.displaced.iter().flat_map(Displaced::rows));
     after.extend(report.measured_error.map(|error| ("measured error", output::number(error))));
-    let rows = [vec![("file", arguments.output.display().to_string())], after];
+    let mut before = vec![("file", arguments.output.display().to_string())];
+    if mesh.tets.len() < opened.session.mesh().map_or(0, CurrentMesh::tet_count) {
+        let [vertices, tets] = [mesh.positions.len(), mesh.tets.len()].map(|count| count as u32);
+        before.push(("in regions", output::mesh(vertices, tets)));
+    }
+    let rows = [before, after];
     arguments.query.print_around(&report, rows, (&answer.summary, answer.seconds))?;
     measured.zip(input).map_or(Ok(()), |(measured, input)| measured.check(input))
 }
@@ -87,17 +116,59 @@ impl Measured {
 }
 
 /// The current mesh in the units of the model and of all its fields.
-fn reference_units(session: &Session, info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
+fn reference_units(
+    session: &Session,
+    info: &MtInfo,
+    mesh: &CurrentMesh,
+    regions: Option<&Regions>,
+) -> TetMesh {
     let field = |(f, info): (usize, &FieldInfo)| {
         let FieldInfo { name, unit, vector, time, .. } = info.clone();
-        Field { name, values: session.exact_values(f), unit, vector, time, integer: false }
+        Field { name, values: session.exact_values(f), unit, vector, time, ..Field::default() }
     };
-    TetMesh {
+    let mut whole = TetMesh {
         positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),
         fields: info.fields.iter().enumerate().map(field).collect(),
         tets: mesh.tets().to_vec(),
         ..TetMesh::default()
+    };
+    if let Some(regions) = regions {
+        let label = |array: usize, &region: &u16| regions.all[usize::from(region)].labels[array] as f64;
+        let of_array = |(array, name): (usize, &String)| Field {
+            integer: true,
+            ..Field::new(name.clone(), mesh.regions().iter().map(|region| label(array, region)).collect())
+        };
+        whole.cell_fields = regions.arrays.iter().enumerate().map(of_array).collect();
+        keep_shown(&mut whole, session.last_view().tets);
     }
+    whole
+}
+
+/// Leaves out the tetrahedra that are not shown, which have no vertices in a view, and points that only these have.
+fn keep_shown(mesh: &mut TetMesh, shown: &[[u32; 4]]) {
+    if !shown.iter().any(|tet| tet[0] == NONE) {
+        return;
+    }
+    let mut is_used = vec![false; mesh.positions.len()];
+    shown.iter().flatten().filter(|&&v| v != NONE).for_each(|&v| is_used[v as usize] = true);
+    let mut next = 0;
+    let mut number = |&used: &bool| {
+        next += u32::from(used);
+        next.saturating_sub(1)
+    };
+    let numbers: Vec<u32> = is_used.iter().map(&mut number).collect();
+    let is_shown: Vec<bool> = shown.iter().map(|tet| tet[0] != NONE).collect();
+    keep(&mut mesh.positions, &is_used);
+    mesh.fields.iter_mut().for_each(|field| keep(&mut field.values, &is_used));
+    keep(&mut mesh.tets, &is_shown);
+    mesh.cell_fields.iter_mut().for_each(|field| keep(&mut field.values, &is_shown));
+    mesh.tets.iter_mut().for_each(|tet| *tet = tet.map(|v| numbers[v as usize]));
+}
+
+/// Leaves out the entries that are not kept.
+fn keep<T>(list: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    list.retain(|_| kept.next().is_some_and(|kept| *kept));
 }
 
 /// The largest difference from the field of the input at its vertices, in the parts that needs of that field select; none

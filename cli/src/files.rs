@@ -369,11 +369,3 @@ fn read_mt(mut source: Bytes) -> Result<Session> {
         }
     }
 }
-
-/// The number of the field called `name`; that which is shown first without a name.
-pub fn field_index(info: &MtInfo, name: Option<&str>) -> Result<usize> {
-    let Some(name) = name else { return Ok(info.first_field()) };
-    let known = || info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>().join(", ");
-    let found = info.fields.iter().position(|field| field.name == name);
-    found.with_context(|| format!("there is no field '{name}'; the MT has: {}", known()))
-}

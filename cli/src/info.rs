@@ -1,15 +1,15 @@
 //! `tetralod info`: what is in an MT file.
 
 use super::files::{Opened, PATIENCE};
-use super::{files, output};
+use super::{extremes, files, output};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tetralod::format;
 use tetralod::format::{BlockInfo, ErrorBytes, ExactStatus};
-use tetralod::mesh::VectorPart;
-use tetralod::mt::{FieldInfo, MtKind, MultiTessellation, stats};
+use tetralod::mesh::{Averaged, Extreme, Extremes, VectorPart};
+use tetralod::mt::{self, FieldInfo, MtInfo, MtKind, MultiTessellation, RegionInfo, stats};
 use tetralod::refine::Request;
 
 /// Describes the content of an MT file. Of large files only what stands in front of the updates is read.
@@ -49,8 +49,13 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     blocks: Option<Blocks>,
     fields: Vec<Field>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regions: Option<Regions>,
     /// Of the reference mesh: x0, y0, z0, x1, y1, z1. Where the file was not read to its end, of all its meshes, or a little more.
     bounds: [f64; 6],
+    /// Of the model, for people.
+    #[serde(skip)]
+    size: f64,
     position_bits: u32,
     /// How far the lattice moves a vertex at most, in model units.
     position_quantization: f64,
@@ -95,8 +100,37 @@ struct Field {
     /// The share of the volume in each of equal bins of the range, if the file says.
     #[serde(skip_serializing_if = "Option::is_none")]
     histogram: Option<Vec<f64>>,
+    /// Where the input has its smallest and largest value, if the file says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    extremes: Option<Extremes>,
+    /// What averaging has done to it, if the input has it at cells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    averaged: Option<Averaged>,
     /// What a mesh of the whole domain takes: errors fall, bytes grow.
     curve: Vec<CurvePoint>,
+}
+
+/// The parts of the volume that all meshes keep apart.
+#[derive(Serialize)]
+struct Regions {
+    /// The arrays of the input that tell them apart.
+    arrays: Vec<String>,
+    /// How far interfaces between them are from those of the input in any mesh, in model units.
+    deviation: f64,
+    all: Vec<Region>,
+}
+
+#[derive(Serialize)]
+struct Region {
+    name: String,
+    /// Its value in each of the arrays.
+    labels: Vec<i64>,
+    /// In the reference mesh, as are the next ones.
+    tetrahedra: u32,
+    volume: f64,
+    bounds: [f64; 6],
+    /// Its place in the palette of regions.
+    color: u8,
 }
 
 #[derive(Clone, Serialize)]
@@ -202,9 +236,24 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
     let structure = structure.map(|(structure, _)| structure);
     let field = |(number, field): (usize, &FieldInfo)| {
         let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
+        let (extremes, averaged) = (field.extremes.clone(), field.averaged.clone());
         let floor = info.floor(number);
         let (histogram, curve) = (opened.session.decoder().histogram(number), curve(opened, number));
-        Field { name, unit, vector, time, min, max, bits, quantization, floor, histogram, curve }
+        Field {
+            name,
+            unit,
+            vector,
+            time,
+            min,
+            max,
+            bits,
+            quantization,
+            floor,
+            histogram,
+            extremes,
+            averaged,
+            curve,
+        }
     };
     Ok(Report {
         kind: info.kind.name(),
@@ -219,7 +268,9 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
         bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
         blocks: blocks(opened),
         fields: info.fields.iter().enumerate().map(field).collect(),
+        regions: mt.regions().map(|regions| described(regions, info)),
         bounds: [x0, y0, z0, x1, y1, z1],
+        size: extremes::size(info),
         position_bits: info.lattice.bits,
         position_quantization: info.quantization,
         displacement_per_error: info.displacement_per_error,
@@ -228,6 +279,25 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
         exact_values: exact_status(opened).name(),
         metadata: opened.session.metadata().iter().cloned().collect(),
     })
+}
+
+fn described(regions: &mt::Regions, info: &MtInfo) -> Regions {
+    let region = |region: &RegionInfo| {
+        let [[x0, y0, z0], [x1, y1, z1]] = region.bounds.map(|corner| info.lattice.point(corner));
+        Region {
+            name: region.name.clone(),
+            labels: region.labels.clone(),
+            tetrahedra: region.tetrahedra,
+            volume: region.volume,
+            bounds: [x0, y0, z0, x1, y1, z1],
+            color: region.color,
+        }
+    };
+    Regions {
+        arrays: regions.arrays.clone(),
+        deviation: regions.deviation,
+        all: regions.all.iter().map(region).collect(),
+    }
 }
 
 fn curve(opened: &Opened, field: usize) -> Vec<CurvePoint> {
@@ -257,8 +327,11 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     parts.extend(blocks.as_ref().map(|blocks| ("header, description and index", blocks.index_bytes as f64)));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
     let rest = match blocks {
-        Some(_) => "histograms, heads and ends of sections",
-        None => "header, description, histograms, heads and ends of sections",
+        Some(_) if opened.mt()?.regions().is_some() => {
+            "histograms, extremes, regions, heads and ends of sections"
+        }
+        Some(_) => "histograms, extremes, heads and ends of sections",
+        None => "header, description, histograms, extremes, heads and ends of sections",
     };
     parts.push((rest, opened.bytes as f64 - known));
     // Few files keep any.
@@ -291,6 +364,31 @@ fn rounded(by: f64) -> String {
     if by == 0.0 { "exact".to_owned() } else { format!("rounded by at most {}", output::number(by)) }
 }
 
+/// Regions that are listed one by one for people.
+const LISTED: usize = 24;
+
+fn region_rows(regions: &Regions) -> Vec<(&str, String)> {
+    let interfaces = match regions.deviation {
+        0.0 => "whose interfaces are those of the input".to_owned(),
+        within => format!("with interfaces within {} of those of the input", output::number(within)),
+    };
+    let count = regions.all.len();
+    let title = format!("{} by {}, {interfaces}", output::count(count as u32), regions.arrays.join(", "));
+    let mut rows = vec![("regions", title)];
+    for Region { name, labels, tetrahedra, volume, .. } in regions.all.iter().take(LISTED) {
+        let (tets, volume) = (output::count(*tetrahedra), output::number(*volume));
+        let label = match labels[..] {
+            [label] if *name != label.to_string() => format!(" ({label})"),
+            _ => String::new(),
+        };
+        rows.push(("  region", format!("{name}{label}: {tets} tetrahedra, volume {volume}")));
+    }
+    if count > LISTED {
+        rows.push(("", format!("{} more: --json lists all", output::count((count - LISTED) as u32))));
+    }
+    rows
+}
+
 /// A field for people, all its time steps in one row.
 fn field_row(steps: &[Field]) -> String {
     let Field { name, unit, vector, time, min, max, bits, .. } = &steps[0];
@@ -298,7 +396,7 @@ fn field_row(steps: &[Field]) -> String {
         Some(VectorPart { name, component: Some(component) }) => {
             format!(" (component {component} of {name})")
         }
-        Some(VectorPart { name, component: None }) => format!(" (length of {name})"),
+        Some(VectorPart { name, component: None }) => format!(" (of {name})"),
         None => String::new(),
     };
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
@@ -314,6 +412,32 @@ fn field_row(steps: &[Field]) -> String {
         _ => String::new(),
     };
     format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
+}
+
+/// Where the input has the smallest and the largest value of a field over all its time steps, and what averaging has done to it in the step
+/// that it has changed most.
+fn extreme_rows(steps: &[Field], size: f64) -> Vec<(&'static str, String)> {
+    let range = steps[0].max - steps[0].min;
+    let all = || steps.iter().filter_map(|step| Some((step, step.extremes.as_ref()?)));
+    let of_time = |step: &Field| match step.time.filter(|_| steps.len() > 1) {
+        Some(time) => format!(", time {}", output::exact(time)),
+        None => String::new(),
+    };
+    let min =
+        all().min_by(|a, b| a.1.min.value.total_cmp(&b.1.min.value)).map(|(step, both)| (step, &both.min));
+    let max = all().reduce(|a, b| if b.1.max.value > a.1.max.value { b } else { a });
+    let max = max.map(|(step, both)| (step, &both.max));
+    let row = |name, found: Option<(&Field, &Extreme)>| {
+        let (step, extreme) = found?;
+        Some((name, format!("{}{}", extremes::value(extreme, range, size), of_time(step))))
+    };
+    let changed = steps.iter().filter_map(|step| Some((step, step.averaged.as_ref()?)));
+    let most = changed.reduce(|a, b| if b.1.difference.largest > a.1.difference.largest { b } else { a });
+    let averaged = most.into_iter().flat_map(|(step, Averaged { input, difference })| {
+        let head = ("  averaged", format!("from cells by volume{}", of_time(step)));
+        std::iter::once(head).chain(extremes::averaged_rows(input, difference, size))
+    });
+    [row("  smallest", min), row("  largest", max)].into_iter().flatten().chain(averaged).collect()
 }
 
 /// Errors at which a row says what a mesh takes, as fractions of the range.
@@ -401,8 +525,10 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
         ("position bits", format!("{}, {}", report.position_bits, rounded(report.position_quantization))),
     ]);
     let steps = |a: &Field, b: &Field| a.name == b.name;
+    let size = report.size;
     for steps in report.fields.chunk_by(steps) {
         rows.push(("field", field_row(steps)));
+        rows.extend(extreme_rows(steps, size));
         // Time steps are alike.
         rows.extend(steps[0].histogram.as_deref().map(|shares| ("  values", histogram_row(shares))));
         // Files without an index state their length alone.
@@ -410,6 +536,7 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
             rows.push(("  bytes at error", curve_row(&steps[0].curve)));
         }
     }
+    rows.extend(report.regions.iter().flat_map(region_rows));
     let parts = structure.iter().flat_map(|all| &all.breakdown);
     rows.extend(parts.map(|part| ("bytes of", part_row(part, report.file_bytes))));
     if report.exact_values != ExactStatus::None.name() {

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, repair_at};
+use tetralod::mt::MultiTessellation;
 use tetralod_build::verify::Reference;
 use tetralod_io as io;
 use tetralod_io::{CellData, FieldSelection, MemoryLimit, ReadOptions, ReadReason, Step};
@@ -186,7 +187,8 @@ pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
 pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let fields = &opened.info()?.fields;
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
-    let wanted = FieldSelection { names: &names, all: false, labels: &[], cells: CellData::Values };
+    let labels = opened.mt()?.regions().map_or(&[][..], |regions| &regions.arrays);
+    let wanted = FieldSelection { names: &names, all: false, labels, cells: CellData::Values };
     // Of several time steps it may have been built from one.
     let time = fields.first().and_then(|field| field.time);
     let is_one = fields.iter().all(|field| field.time == time);
@@ -199,7 +201,7 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
         mesh.expand_grid();
     }
     if !mesh.is_grid_alone() {
-        mesh.cells_to_points();
+        mesh.settle_cells(true, labels);
         mesh.add_geometry_fields(wanted.names);
     }
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {

@@ -1,11 +1,12 @@
 //! `tetralod isosurface`: surfaces on which a field has a value.
 
+use super::deform::{Deform, Displaced};
 use super::poly::{Amount, Target};
 use super::query::Query;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
-use tetralod::view::is_closed;
+use tetralod::view::{Triangles, is_closed};
 use tetralod_io::PolyData;
 
 /// Writes isosurfaces: where the field has the values given with --iso.
@@ -19,6 +20,8 @@ pub struct Arguments {
     /// The surface to write: .vtp, .stl, .ply, .obj, .npz, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
+    #[command(flatten)]
+    deform: Deform,
 }
 
 /// The result as programs get it.
@@ -29,6 +32,8 @@ struct Report {
     surface: Amount,
     /// Whether the surfaces have no border.
     closed: bool,
+    #[serde(flatten)]
+    displaced: Option<Displaced>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -40,12 +45,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut answer = arguments.query.answer()?;
     let fields = answer.all_values()?;
     let start = Instant::now();
-    let surface = answer.opened.session.isosurfaces(isovalues)?.clone();
+    let mut surface = answer.opened.session.isosurfaces(isovalues)?.clone();
     let seconds = start.elapsed().as_secs_f64();
+    let deformed = arguments.deform.of(&arguments.query, &answer)?;
     let mesh = answer.opened.session.view();
     let mut values: Vec<Vec<f64>> = fields.iter().map(|field| surface.interpolate(&mesh, field)).collect();
     // Of its own field they are the isovalues, without rounding.
-    values[answer.field] = surface.values;
+    values[answer.field].clone_from(&surface.values);
+    let (deformation, displaced) = deformed.unzip();
+    if let Some(deformation) = deformation {
+        let slopes = surface.slopes(&mesh, deformation.fields.map(|field| fields[field].as_slice()));
+        let times = deformation.factor * deformation.part;
+        surface.normals = Triangles { slopes: &slopes, ..Triangles::from(&surface) }.turned_normals(times);
+        surface.positions =
+            deformation.moved(&surface.positions, deformation.fields.map(|field| values[field].as_slice()));
+    }
     let data = PolyData {
         normals: surface.normals,
         fields: answer.point_values(values)?,
@@ -57,8 +71,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         isovalues: isovalues.to_vec(),
         surface: Amount::of(&data, origin),
         closed: is_closed(&data.triangles),
+        displaced,
     };
     let mut rows = report.surface.rows(&arguments.output);
     rows.push(("border", if report.closed { "none" } else { "where the mesh ends" }.to_owned()));
+    rows.extend(report.displaced.iter().flat_map(Displaced::rows));
     arguments.query.print(&report, rows, (&answer.summary, seconds))
 }

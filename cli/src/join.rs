@@ -1,11 +1,12 @@
 //! `tetralod join`: parts that are built to one MT file.
 
 use super::output::{self, Verbosity};
-use super::{build, files, parts};
+use super::{build, extremes, files, parts};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;
+use tetralod::mt::{AveragedField, MultiTessellation};
 use tetralod_build::parts::Node;
 use tetralod_build::{BuildResult, BuildSummary};
 
@@ -32,6 +33,12 @@ struct Report {
     #[serde(flatten)]
     counts: BuildSummary,
     file_bytes: u64,
+    /// How many regions the file has, if it has some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regions: Option<usize>,
+    /// What averaging has done to the fields that the input has at cells.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    averaged: Vec<AveragedField>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -50,5 +57,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut rows = vec![("file", output.display().to_string())];
     rows.extend(build::report::rows_of(&summary));
     rows.push(("file size", output::bytes(file_bytes)));
-    verbosity.print(&Report { counts: summary, file_bytes }, &rows)
+    let regions = mt.regions().map(|regions| regions.all.len());
+    rows.extend(regions.map(|count| ("regions", output::count(count as u32))));
+    let averaged = mt.info().averaged_fields();
+    rows.extend(extremes::rows(&averaged, extremes::size(mt.info())));
+    verbosity.print(&Report { counts: summary, file_bytes, regions, averaged }, &rows)
 }

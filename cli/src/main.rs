@@ -7,7 +7,9 @@
 mod bench;
 mod build;
 mod convert;
+mod deform;
 mod extract;
+mod extremes;
 mod files;
 mod generate;
 mod info;
@@ -32,6 +34,7 @@ mod restrictions;
 mod serve;
 mod slice;
 mod stats;
+mod steps;
 mod streamlines;
 mod surface;
 mod usage;

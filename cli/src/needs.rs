@@ -3,8 +3,8 @@
 use super::parse::{
     Tolerance, parse_bounds, parse_list, parse_number, parse_numbers, parse_range, parse_share, parse_size,
 };
-use super::{files, output};
-use anyhow::{Context, Result};
+use super::{output, steps};
+use anyhow::{Context, Result, anyhow};
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, Command, FromArgMatches};
 use serde::Deserialize;
@@ -14,7 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tetralod::geom::Bounds;
-use tetralod::mt::MtInfo;
+use tetralod::mt::{Mt, MtInfo, MultiTessellation, numbers_of};
 use tetralod::refine::{Need, Part, RefineStats, Region, Transfer, View};
 use tetralod::session::Session;
 
@@ -55,6 +55,9 @@ pub struct Group {
     /// Only where n · p <= d for all of these planes, at most 16
     #[arg(long, value_name = "nx,ny,nz,d,nx,…", value_parser = parse_convex, allow_hyphen_values = true)]
     convex: Vec<Region>,
+    /// Only in this region of the file, by its name or else its label, as `tetralod info` lists them (repeatable)
+    #[arg(long = "region", value_name = "NAME|LABEL", allow_hyphen_values = true)]
+    regions: Vec<String>,
     /// Only around the isosurface at this value, in units of the field (repeatable)
     #[arg(long = "iso", value_name = "V", value_parser = parse_number, allow_hyphen_values = true)]
     isovalues: Vec<f64>,
@@ -64,6 +67,10 @@ pub struct Group {
     /// The field of all these values and errors [default: the first that does not number something or say where it is, such as material]
     #[arg(long, value_name = "NAME")]
     field: Option<String>,
+    /// Of several time steps of the field that at this time of the file [default: the first]. What is written has no other steps,
+    /// and what displaces and colours is of that time
+    #[arg(long, value_name = "T", value_parser = parse_number, allow_hyphen_values = true)]
+    time: Option<f64>,
     /// What a camera sees, within --pixels: a file with its matrix and viewport (repeatable)
     #[arg(long = "view", value_name = "FILE.json")]
     views: Vec<PathBuf>,
@@ -165,6 +172,11 @@ impl Group {
         self.field.as_deref()
     }
 
+    /// The time that is asked for.
+    pub fn time(&self) -> Option<f64> {
+        self.time
+    }
+
     /// The points of the first transfer function and its unit length, as a part of the model's diagonal, if
     /// there is one and it is of the field that is shown.
     pub fn shown(&self, field: &str) -> Result<Option<(Vec<[f64; 5]>, f64)>> {
@@ -176,7 +188,12 @@ impl Group {
 
     /// Whether it says neither where the mesh is needed nor how accurate it is to be.
     pub fn is_empty(&self) -> bool {
-        self.is_bare() && self.error.is_none()
+        self.is_bare() && self.error.is_none() && self.regions.is_empty()
+    }
+
+    /// The same in some regions only; none if it says where the mesh is needed.
+    pub fn limited_to(&self, regions: &[Region]) -> Option<Self> {
+        self.is_bare().then(|| Self { boxes: regions.to_vec(), ..self.clone() })
     }
 
     /// Whether it says nothing about where the mesh is needed.
@@ -184,12 +201,12 @@ impl Group {
         !self.is_limited() && !self.has_camera() && self.transfers.is_empty()
     }
 
-    /// Whether there are regions or values.
+    /// Whether there are shapes or values.
     fn is_limited(&self) -> bool {
-        self.regions().next().is_some() || !self.isovalues.is_empty() || !self.ranges.is_empty()
+        self.shapes().next().is_some() || !self.isovalues.is_empty() || !self.ranges.is_empty()
     }
 
-    fn regions(&self) -> impl Iterator<Item = &Region> {
+    fn shapes(&self) -> impl Iterator<Item = &Region> {
         let kinds =
             [&self.boxes, &self.oriented_boxes, &self.spheres, &self.half_spaces, &self.slabs, &self.convex];
         kinds.into_iter().flatten()
@@ -216,9 +233,27 @@ impl Group {
         Err(wrong.to_owned())
     }
 
-    /// Adds the needs; `field` is the field's name if the group has none.
-    pub fn add_to(&self, info: &MtInfo, field: Option<&str>, needs: &mut Vec<NamedNeed>) -> Result<()> {
-        let field = files::field_index(info, self.field().or(field))?;
+    /// The regions that it names.
+    pub fn regions(&self) -> &[String] {
+        &self.regions
+    }
+
+    /// Adds the needs, of a field by its number.
+    pub fn add_to(&self, mt: &Mt, field: usize, needs: &mut Vec<NamedNeed>) -> Result<()> {
+        let first = needs.len();
+        self.add_everywhere(mt.info(), field, needs)?;
+        if !self.regions.is_empty() {
+            let regions = find_regions(mt, &self.regions)?;
+            for NamedNeed { name, need } in &mut needs[first..] {
+                *name = format!("{name} in region {}", self.regions.join(", "));
+                need.regions = Some(regions.clone());
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the needs without their regions.
+    fn add_everywhere(&self, info: &MtInfo, field: usize, needs: &mut Vec<NamedNeed>) -> Result<()> {
         if self.is_bare() || self.is_limited() {
             self.add_limited(info, field, needs);
         }
@@ -239,8 +274,9 @@ impl Group {
 
     fn transfer(&self, path: &Path, info: &MtInfo, field: usize) -> Result<NamedNeed> {
         let file: TransferFile = read_json(path)?;
-        let name = file.field.as_deref();
-        let field = if name.is_some() { files::field_index(info, name)? } else { field };
+        // A field of its own is at the time of the one that is asked for.
+        let own = file.field.as_deref().map(|name| steps::beside(info, name, field)).transpose()?;
+        let field = own.unwrap_or(field);
         let error = self.colour_error.or(file.error).unwrap_or(0.01);
         let colour = |[value, r, g, b, opacity]: [f64; 5]| (value, [r, g, b, opacity]);
         let points = file.points.into_iter().map(colour).collect();
@@ -252,11 +288,11 @@ impl Group {
         let error = self.error.map_or(0.0, |error| error.relative(info.fields[field].range()));
         let isovalues = self.isovalues.iter().map(|&value| [value, value]);
         let ranges: Vec<[f64; 2]> = isovalues.chain(self.ranges.iter().copied()).collect();
-        let mut regions: Vec<Option<&Region>> = self.regions().map(Some).collect();
-        if regions.is_empty() {
-            regions.push(None);
+        let mut shapes: Vec<Option<&Region>> = self.shapes().map(Some).collect();
+        if shapes.is_empty() {
+            shapes.push(None);
         }
-        for region in regions {
+        for region in shapes {
             let (mut need, mut words) = (Need::within(error), Vec::new());
             if let Some(region) = region {
                 need = need.inside(region.clone());
@@ -270,6 +306,14 @@ impl Group {
             needs.push(NamedNeed { name, need });
         }
     }
+}
+
+/// The regions of an MT that are named, by their names or labels.
+pub fn find_regions(mt: &Mt, names: &[String]) -> Result<Vec<u16>> {
+    let regions = mt.regions().context(
+        "the file has no regions: build it with --preserve and the name of an array of whole numbers",
+    )?;
+    numbers_of(Some(regions), names).map_err(|(_, problem)| anyhow!(problem))
 }
 
 /// A word about a need that can meet nothing: values that the field does not have, or a region outside of the domain.
@@ -446,7 +490,7 @@ mod tests {
     #[test]
     fn a_need_is_read_from_keys_and_values() {
         let group: Group = "box=0,0,0,1,1,1; iso = -0.5;range=1,2; error=1%".parse().expect("a need");
-        assert_eq!(group.regions().count(), 1);
+        assert_eq!(group.shapes().count(), 1);
         assert_eq!((&group.isovalues[..], &group.ranges[..]), (&[-0.5][..], &[[1.0, 2.0]][..]));
         assert!(matches!(group.error, Some(Tolerance::Relative(x)) if x == 0.01));
         for (text, words) in [

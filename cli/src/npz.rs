@@ -6,11 +6,12 @@ use anyhow::Result;
 use std::io::{BufWriter, Seek, Write};
 use std::path::Path;
 use tetralod::mesh::TetMesh;
-use tetralod_io::{PolyData, point_arrays};
+use tetralod_io::{PolyData, cell_arrays, point_arrays};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Writes `positions` (n × 3), `tets` (m × 4) and each array of values by its name; vectors have a column for each component.
+/// Writes `positions` (n × 3), `tets` (m × 4) and each array of values by its name, those at cells with `cell_` in front; vectors have a column for
+/// each component.
 pub fn write_mesh(mesh: &TetMesh, path: &Path) -> Result<()> {
     files::write_seekable(path, |out| {
         let mut archive = Archive::new(out);
@@ -20,6 +21,11 @@ pub fn write_mesh(mesh: &TetMesh, path: &Path) -> Result<()> {
             let columns = Some(array.components.len()).filter(|columns| *columns > 1);
             let values: Vec<f64> = array.values().collect();
             archive.add(&array.name, columns, values.into_iter())?;
+        }
+        for array in cell_arrays(mesh)? {
+            let columns = Some(array.components.len()).filter(|columns| *columns > 1);
+            let values: Vec<f64> = array.values().collect();
+            archive.add(&format!("cell_{}", array.name), columns, values.into_iter())?;
         }
         archive.finish()
     })

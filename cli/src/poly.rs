@@ -44,6 +44,11 @@ impl Target {
         files::check_output(&self.path, inputs)
     }
 
+    /// Whether it is a table.
+    pub fn is_table(&self) -> bool {
+        self.format == Format::Csv
+    }
+
     /// Writes a surface; a table gets its points. Returns what positions in the file are relative to.
     pub fn write(&self, data: &PolyData) -> Result<Origin> {
         match self.format {
@@ -71,7 +76,7 @@ impl Target {
 
     /// Writes `data`, or `table` if the file is one.
     pub fn write_either(&self, data: &PolyData, table: &[(String, Vec<f64>)]) -> Result<()> {
-        if self.format == Format::Csv { self.write_table(table) } else { self.write(data).map(|_| ()) }
+        if self.is_table() { self.write_table(table) } else { self.write(data).map(|_| ()) }
     }
 
     fn write_table(&self, table: &[(String, Vec<f64>)]) -> Result<()> {

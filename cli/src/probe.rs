@@ -3,12 +3,16 @@
 use super::output;
 use super::parse::parse_numbers;
 use super::poly::{Target, coordinates};
-use super::query::{Answer, Query};
+use super::query::{Answer, Query, Scope};
 use anyhow::{Context, Result};
+use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use tetralod::geom::Bounds;
+use tetralod::mt::MtInfo;
+use tetralod::refine::Region;
 use tetralod::view::{MeshView, Place, Probe, Span};
 use tetralod_io::PolyData;
 
@@ -30,6 +34,9 @@ pub struct Arguments {
     /// The values to write: .csv, or .vtp, .ply, .obj, .npz for the points and lines with their values.
     #[arg(short, long, value_name = "FILE")]
     output: Option<Target>,
+    /// Write a .csv with a row for each point and time step, and a column for each field.
+    #[arg(long, requires = "output", conflicts_with = "time")]
+    over_time: bool,
 }
 
 /// Where to look.
@@ -66,6 +73,23 @@ struct Report {
     /// The fields at each --point; null outside.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     values: Vec<Option<BTreeMap<String, f64>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    over_time: Option<OverTime>,
+}
+
+/// The values of fields with several time steps at each --point.
+#[derive(Serialize)]
+struct OverTime {
+    times: Vec<f64>,
+    /// By the name of a field, for each time that it has, else null; null outside.
+    values: Vec<Option<BTreeMap<String, Vec<Option<f64>>>>>,
+}
+
+/// A field that is written: its number, its name, and its values at all samples.
+struct Column<'a> {
+    field: usize,
+    name: String,
+    values: &'a [Option<f64>],
 }
 
 /// A point that was looked at.
@@ -90,49 +114,91 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         crate::usage::refuse_usage("--samples are points of a line: give --line, too");
     }
     if let Some(target) = &arguments.output {
+        if arguments.over_time && !target.is_table() {
+            crate::usage::refuse_usage("--over-time is a table: let the name of the output end in .csv");
+        }
         let inputs = arguments.what.list.iter().chain(arguments.query.files());
         target.check(inputs)?;
     }
-    let mut answer = arguments.query.answer()?;
+    let points = arguments.what.points()?;
+    let places = around(arguments.what.line, &points);
+    let mut answer = arguments.query.answer_for(&Scope { at_all_times: arguments.over_time, places })?;
     let start = Instant::now();
     let fields = answer.all_values()?;
-    let names = answer.field_names()?;
+    let written = answer.written_fields()?;
     let mesh = answer.opened.session.view();
-    let found = look(arguments, mesh)?;
+    let found = look(arguments, mesh, points);
     let seconds = start.elapsed().as_secs_f64();
     let value = |sample: &Sample, f: usize| sample.place.map(|place| place.interpolate(&mesh, &fields[f]));
-    let columns: Vec<Vec<Option<f64>>> =
-        (0..names.len()).map(|f| found.samples.iter().map(|sample| value(sample, f)).collect()).collect();
-    if let Some(target) = &arguments.output {
-        target.write_either(&poly_data(&found, &columns, &answer)?, &table(&found, &names, &columns))?;
-    }
-    let report = report(arguments, &found, &names, &columns);
-    // Digits that the bound of the mesh leaves without a meaning are not shown.
+    let all: Vec<Vec<Option<f64>>> =
+        (0..fields.len()).map(|f| found.samples.iter().map(|sample| value(sample, f)).collect()).collect();
+    let column = |(field, name)| Column { field, name, values: &all[field] };
+    let columns: Vec<Column<'_>> = written.into_iter().map(column).collect();
     let info = answer.opened.info()?;
-    let steps = info.fields.iter().enumerate().map(|(f, field)| {
-        let bound = info.field_bound(f, answer.stats.error_bound);
-        (field.name.clone(), if bound > 0.0 { bound.min(1e-4 * field.range()) } else { field.step })
-    });
-    let rows = rows(arguments, &report, &steps.collect());
+    if let Some(target) = &arguments.output {
+        let table =
+            if arguments.over_time { over_time(&found, info, &columns) } else { table(&found, &columns) };
+        target.write_either(&poly_data(&found, &all, &answer)?, &table)?;
+    }
+    let report = report(arguments, &found, info, &columns);
+    // Digits that the bound of the mesh leaves without a meaning are not shown.
+    let step = |column: &Column<'_>| {
+        let (bound, field) =
+            (info.field_bound(column.field, answer.stats.error_bound), &info.fields[column.field]);
+        if bound > 0.0 { bound.min(1e-4 * field.range()) } else { field.step }
+    };
+    let steps: Vec<f64> = columns.iter().map(step).collect();
+    let rows = rows(arguments, &report, (&columns, &steps));
     arguments.query.print(&report, rows, (&answer.summary, seconds))
 }
 
-fn look(arguments: &Arguments, mesh: MeshView<'_>) -> Result<Samples> {
+impl What {
+    /// The points that are given.
+    fn points(&self) -> Result<Vec<[f64; 3]>> {
+        self.list.as_ref().map_or_else(|| Ok(self.points.clone()), |path| read_points(path))
+    }
+}
+
+/// So many points have regions of their own; more have one around all of them.
+const MOST_REGIONS: usize = 32;
+
+/// How thick the region around a line is, as a part of its length: no more than rounding.
+const THICKNESS: f64 = 1e-9;
+
+/// Where the mesh is needed for a line or points.
+fn around(line: Option<[f64; 6]>, points: &[[f64; 3]]) -> Vec<Region> {
+    if let Some([x0, y0, z0, x1, y1, z1]) = line {
+        let [from, to] = [DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1)];
+        let (half, centre) = (0.5 * (to - from), from.midpoint(to).to_array());
+        let Some(along) = half.try_normalize() else { return vec![point(centre)] };
+        let (u, v) = along.any_orthonormal_pair();
+        let width = THICKNESS * half.length();
+        let halves = [half, width * u, width * v].map(|half| half.to_array());
+        return vec![Region::OrientedBox { centre, halves }];
+    }
+    if points.len() > MOST_REGIONS {
+        return vec![Region::Box(Bounds::of(points))];
+    }
+    points.iter().copied().map(point).collect()
+}
+
+/// The region that is a point.
+fn point(place: [f64; 3]) -> Region {
+    Region::Box(Bounds { min: place, max: place })
+}
+
+fn look(arguments: &Arguments, mesh: MeshView<'_>, points: Vec<[f64; 3]>) -> Samples {
     let mut probe = Probe::new(mesh);
     if let Some([x0, y0, z0, x1, y1, z1]) = arguments.what.line {
         let ends = [[x0, y0, z0], [x1, y1, z1]];
-        return Ok(match arguments.samples {
+        return match arguments.samples {
             Some(count) => evenly(&mut probe, ends, count),
             None => profile(&probe, ends),
-        });
+        };
     }
-    let points = match &arguments.what.list {
-        Some(path) => read_points(path)?,
-        None => arguments.what.points.clone(),
-    };
     let places = probe.locate_all(&points);
     let sample = |(position, place)| Sample { position, distance: None, place };
-    Ok(Samples { samples: points.into_iter().zip(places).map(sample).collect(), ..Samples::default() })
+    Samples { samples: points.into_iter().zip(places).map(sample).collect(), ..Samples::default() }
 }
 
 fn at([from, to]: [[f64; 3]; 2], s: f64) -> [f64; 3] {
@@ -140,7 +206,7 @@ fn at([from, to]: [[f64; 3]; 2], s: f64) -> [f64; 3] {
 }
 
 fn length([from, to]: [[f64; 3]; 2]) -> f64 {
-    (0..3).map(|i| (to[i] - from[i]) * (to[i] - from[i])).sum::<f64>().sqrt()
+    DVec3::from(from).distance(DVec3::from(to))
 }
 
 fn inside(spans: &[Span]) -> f64 {
@@ -208,7 +274,7 @@ fn read_points(path: &Path) -> Result<Vec<[f64; 3]>> {
     Ok(points)
 }
 
-fn table(found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> Vec<(String, Vec<f64>)> {
+fn table(found: &Samples, columns: &[Column<'_>]) -> Vec<(String, Vec<f64>)> {
     let column = |of: &dyn Fn(&Sample) -> Option<f64>| -> Vec<f64> {
         found.samples.iter().map(|sample| of(sample).unwrap_or(f64::NAN)).collect()
     };
@@ -218,41 +284,105 @@ fn table(found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> Vec
     }
     table.extend(coordinates(found.samples.iter().map(|sample| sample.position)));
     table.push(("tetrahedron".to_owned(), column(&|sample| sample.place.map(|place| f64::from(place.tet)))));
-    for (name, values) in names.iter().zip(columns) {
+    for Column { name, values, .. } in columns {
         table.push((name.clone(), values.iter().map(|value| value.unwrap_or(f64::NAN)).collect()));
     }
     table
 }
 
+/// The times of fields, ascending.
+fn times(info: &MtInfo, columns: &[Column<'_>]) -> Vec<f64> {
+    let mut times: Vec<f64> = columns.iter().filter_map(|column| info.fields[column.field].time).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
+}
+
+/// The names of fields without their times, in the order of the MT.
+fn names<'a>(info: &'a MtInfo, columns: &[Column<'_>]) -> Vec<&'a str> {
+    let mut names: Vec<&str> = Vec::new();
+    for Column { field, .. } in columns {
+        let name = info.fields[*field].name.as_str();
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// The value of a field at a sample and a time, at which it is that of a field without time, too.
+fn value_at(info: &MtInfo, columns: &[Column<'_>], name: &str, time: f64, sample: usize) -> Option<f64> {
+    let is_of = |column: &&Column<'_>| {
+        let field = &info.fields[column.field];
+        field.name == name && field.time.is_none_or(|own| own == time)
+    };
+    columns.iter().find(is_of)?.values[sample]
+}
+
+/// A row for each sample and time, and a column for each field.
+fn over_time(found: &Samples, info: &MtInfo, columns: &[Column<'_>]) -> Vec<(String, Vec<f64>)> {
+    let times = times(info, columns);
+    let rows = || (0..found.samples.len()).flat_map(|i| times.iter().map(move |&time| (i, time)));
+    let mut table = vec![("point".to_owned(), rows().map(|(i, _)| (i + 1) as f64).collect())];
+    if found.length.is_some() {
+        let distance = rows().map(|(i, _)| found.samples[i].distance.unwrap_or(f64::NAN));
+        table.push(("distance".to_owned(), distance.collect()));
+    }
+    table.extend(coordinates(rows().map(|(i, _)| found.samples[i].position)));
+    table.push(("time".to_owned(), rows().map(|(_, time)| time).collect()));
+    for name in names(info, columns) {
+        let value = |(i, time)| value_at(info, columns, name, time, i).unwrap_or(f64::NAN);
+        table.push((name.to_owned(), rows().map(value).collect()));
+    }
+    table
+}
+
 /// The points that are inside, and the lines through them.
-fn poly_data(found: &Samples, columns: &[Vec<Option<f64>>], answer: &Answer) -> Result<PolyData> {
+fn poly_data(found: &Samples, all: &[Vec<Option<f64>>], answer: &Answer) -> Result<PolyData> {
     let kept: Vec<usize> = (0..found.samples.len()).filter(|&i| found.samples[i].place.is_some()).collect();
     let mut new = vec![0; found.samples.len()];
     (0..).zip(&kept).for_each(|(v, &i)| new[i] = v);
     let values = |column: &Vec<Option<f64>>| kept.iter().map(|&i| column[i].unwrap_or_default()).collect();
     Ok(PolyData {
-        fields: answer.point_values(columns.iter().map(values))?,
+        fields: answer.point_values(all.iter().map(values).collect())?,
         lines: found.lines.iter().map(|line| line.iter().map(|&i| new[i as usize]).collect()).collect(),
         ..answer.poly_data(kept.iter().map(|&i| found.samples[i].position).collect())?
     })
 }
 
-fn report(arguments: &Arguments, found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> Report {
+fn report(arguments: &Arguments, found: &Samples, info: &MtInfo, columns: &[Column<'_>]) -> Report {
+    let points = arguments.what.points.len();
     let all_at = |i: usize| {
-        let values = names.iter().zip(columns).map(|(name, column)| Some((name.clone(), column[i]?)));
+        let values = columns.iter().map(|column| Some((column.name.clone(), column.values[i]?)));
         values.collect::<Option<BTreeMap<_, _>>>()
     };
+    let times = times(info, columns);
+    let at_all_times = |i: usize| {
+        found.samples[i].place?;
+        let has_steps =
+            |name: &&str| columns.iter().filter(|c| info.fields[c.field].name == *name).count() > 1;
+        let values = |name: &str| times.iter().map(|&time| value_at(info, columns, name, time, i)).collect();
+        let steps = names(info, columns).into_iter().filter(has_steps);
+        Some(steps.map(|name| (name.to_owned(), values(name))).collect())
+    };
+    let over_time = (times.len() > 1 && points > 0)
+        .then(|| OverTime { values: (0..points).map(at_all_times).collect(), times: times.clone() });
     Report {
         points: found.samples.len(),
         outside: found.samples.iter().filter(|sample| sample.place.is_none()).count(),
         length: found.length,
         length_inside: found.length_inside,
-        values: (0..arguments.what.points.len()).map(all_at).collect(),
+        values: (0..points).map(all_at).collect(),
+        over_time,
     }
 }
 
-/// `steps`: by field, how much counts of a value.
-fn rows(arguments: &Arguments, report: &Report, steps: &BTreeMap<String, f64>) -> Vec<(String, String)> {
+/// `steps`: how much counts of a value of each column.
+fn rows(
+    arguments: &Arguments,
+    report: &Report,
+    (columns, steps): (&[Column<'_>], &[f64]),
+) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     if let Some(target) = &arguments.output {
         lines.push(("file".to_owned(), target.path.display().to_string()));
@@ -262,16 +392,13 @@ fn rows(arguments: &Arguments, report: &Report, steps: &BTreeMap<String, f64>) -
     for (name, length) in [("length", report.length), ("length inside", report.length_inside)] {
         lines.extend(length.map(|length| (name.to_owned(), output::number(length))));
     }
-    for (point, values) in arguments.what.points.iter().zip(&report.values) {
+    for (i, point) in arguments.what.points.iter().enumerate() {
         let at = point.map(output::exact).join(",");
-        match values {
-            Some(values) => {
-                let shown =
-                    |(name, v): (&String, &f64)| output::within(*v, steps.get(name).copied().unwrap_or(0.0));
-                lines.extend(values.iter().map(|each| (format!("{} at {at}", each.0), shown(each))));
-            }
-            None => lines.push((at, "outside".to_owned())),
-        }
+        let row = |(Column { name, values, .. }, step): (&Column<'_>, &f64)| {
+            Some((format!("{name} at {at}"), output::within(values[i]?, *step)))
+        };
+        let rows: Option<Vec<_>> = columns.iter().zip(steps).map(row).collect();
+        lines.extend(rows.unwrap_or_else(|| vec![(at.clone(), "outside".to_owned())]));
     }
     lines
 }

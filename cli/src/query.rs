@@ -5,15 +5,15 @@
 use super::files::{Bytes, Opened, PATIENCE};
 use super::needs::{Group, NamedNeed};
 use super::parse::{Tolerance, parse_bytes, parse_count, parse_size};
-use super::{files, needs, output};
+use super::{files, needs, output, steps};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tetralod::format::FormatError;
-use tetralod::mt::{FieldInfo, Mt, MtInfo};
-use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
+use tetralod::mt::{FieldInfo, Mt, MtInfo, MultiTessellation};
+use tetralod::refine::{Budget, Need, Outcome, RefineStats, Region, Request};
 use tetralod::session::{Client, ClientError};
 use tetralod::stream::Traffic;
 use tetralod_io::{PointValues, PolyData};
@@ -28,7 +28,7 @@ Examples (everything in model units and units of the field, errors also in % of 
                                                     a box at full detail and, everywhere, two isosurfaces
   --view camera.json --pixels 2 --outside 10%       what a camera sees, and roughly the rest
   --transfer colours.json --max-bytes 50M           the best picture that 50 MiB can give
-Regions and values limit each other; everything else is a union. Without any option the mesh is the reference mesh.
+Shapes, regions and values limit each other; everything else is a union. Without any option the mesh is the reference mesh.
 
 camera.json:  {\"matrix\": [16 numbers: clip from model space, column by column], \"viewport\": [1920, 1080], \"pixels\": 1}
 colours.json: {\"points\": [[value, red, green, blue, opacity], ...], \"unit_length\": 0.1, \"field\": \"name\"}; colours and
@@ -89,36 +89,83 @@ impl Query {
         self.group.shown(field)
     }
 
-    /// The field's name, if there is one.
-    pub fn field(&self) -> Option<&str> {
-        self.group.field()
+    /// The number of the field that is asked for.
+    pub fn field_index(&self, info: &MtInfo) -> Result<usize> {
+        steps::field_index(info, self.group.field(), self.group.time())
     }
 
-    fn named_needs(&self, info: &MtInfo) -> Result<Vec<NamedNeed>> {
-        let mut needs = Vec::new();
-        // Without any other need, the mesh is the reference mesh everywhere.
-        if !self.group.is_empty() || self.needs.is_empty() && self.outside.is_none() {
-            self.group.add_to(info, None, &mut needs)?;
+    /// The number of the field of one of the needs, given that of the field that is shown.
+    fn field_of(&self, group: &Group, info: &MtInfo, shown: usize) -> Result<usize> {
+        if group.time().is_some() {
+            return steps::field_index(info, group.field().or(self.group.field()), group.time());
         }
-        for group in &self.needs {
-            group.add_to(info, self.group.field(), &mut needs)?;
+        let Some(name) = group.field() else { return Ok(shown) };
+        let field = steps::beside(info, name, shown)?;
+        self.check_step(info, shown, field).map(|()| field)
+    }
+
+    /// Refuses what is to displace or colour if it has steps, but none at the time that is asked for. `shown` is the field at that time.
+    pub fn check_step(&self, info: &MtInfo, shown: usize, other: usize) -> Result<()> {
+        match (self.group.time(), info.fields[other].time) {
+            (Some(time), Some(found)) if info.fields[shown].time != Some(found) => {
+                Err(steps::no_step(info, other, time))
+            }
+            _ => Ok(()),
         }
-        if let Some(error) = self.outside {
-            let field = files::field_index(info, self.group.field())?;
-            let need = Need::within(error.relative(info.fields[field].range()));
-            needs.push(NamedNeed { name: "everywhere".to_owned(), need });
+    }
+
+    /// What is needed at the places of a scope alone, if the options do not say where.
+    fn narrowed(&self, scope: &Scope) -> Option<Group> {
+        let is_open = !scope.places.is_empty() && self.needs.is_empty() && self.outside.is_none();
+        self.group.limited_to(&scope.places).filter(|_| is_open)
+    }
+
+    /// The needs, given the time steps of the field that are shown: those of all.
+    fn named_needs(&self, mt: &Mt, steps: &[usize], scope: &Scope) -> Result<Vec<NamedNeed>> {
+        let (info, mut needs) = (mt.info(), Vec::new());
+        if let Some(group) = self.narrowed(scope) {
+            for &shown in steps {
+                group.add_to(mt, shown, &mut needs)?;
+            }
+            return Ok(needs);
+        }
+        for (i, &shown) in steps.iter().enumerate() {
+            // Without any other need, the mesh is the reference mesh everywhere.
+            if !self.group.is_empty() || self.needs.is_empty() && self.outside.is_none() {
+                self.group.add_to(mt, shown, &mut needs)?;
+            }
+            for group in self.needs.iter().filter(|group| i == 0 || group.time().is_none()) {
+                group.add_to(mt, self.field_of(group, info, shown)?, &mut needs)?;
+            }
+            if let Some(error) = self.outside {
+                let need = Need::within(error.relative(info.fields[shown].range()));
+                needs.push(NamedNeed { name: "everywhere".to_owned(), need });
+            }
         }
         Ok(needs)
     }
 
+    /// The regions that the result shows, as they are named; all if there are none, or something is asked for elsewhere.
+    pub fn shown_regions(&self) -> Option<Vec<String>> {
+        let of_group = (!self.group.is_empty() || self.needs.is_empty()).then_some(&self.group);
+        let groups = || of_group.into_iter().chain(&self.needs);
+        let is_limited = self.outside.is_none() && groups().all(|group| !group.regions().is_empty());
+        is_limited.then(|| groups().flat_map(|group| group.regions().to_vec()).collect())
+    }
+
     /// Opens the MT and refines its mesh to what is asked for; the session shows the field that is asked for.
     pub fn answer(&self) -> Result<Answer> {
-        self.answer_with(|_| Ok(()))
+        self.answer_for(&Scope::default())
+    }
+
+    /// [`Query::answer`] with a mesh for more, or for less.
+    pub fn answer_for(&self, scope: &Scope) -> Result<Answer> {
+        self.answer_with(scope, |_| Ok(()))
     }
 
     /// [`Query::answer`] with the exact values that the file keeps, and a warning if they are cut off.
     pub fn answer_exactly(&self) -> Result<Answer> {
-        self.answer_with(|client| match client.fetch_exact() {
+        self.answer_with(&Scope::default(), |client| match client.fetch_exact() {
             Err(ClientError::Format(FormatError::Truncated { .. })) => {
                 let file = self.file.display();
                 output::note(&format!(
@@ -131,18 +178,28 @@ impl Query {
         })
     }
 
-    fn answer_with(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {
+    fn answer_with(
+        &self,
+        scope: &Scope,
+        fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>,
+    ) -> Result<Answer> {
         if let Err(wrong) = self.group.check() {
             crate::usage::refuse_usage(&wrong);
         }
-        self.refined(fetch_more).with_context(|| self.file.display().to_string())
+        self.refined(scope, fetch_more).with_context(|| self.file.display().to_string())
     }
 
-    fn refined(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {
+    fn refined(
+        &self,
+        scope: &Scope,
+        fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>,
+    ) -> Result<Answer> {
         let mut client = files::open_parts(&self.file)?;
-        let info = client.session().info().context("the MT has no description")?;
-        let needs = self.named_needs(info)?;
-        let field = files::field_index(info, self.group.field())?;
+        let mt = client.session().mt().context("the MT has no description")?;
+        let info = mt.info();
+        let field = self.field_index(info)?;
+        let steps = if scope.at_all_times { steps::in_order(info, field)? } else { vec![field] };
+        let (field, needs) = (steps[0], self.named_needs(mt, &steps, scope)?);
         let budget = Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes };
         client.request(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
         while !client.fetch(PATIENCE)? {}
@@ -151,10 +208,16 @@ impl Query {
         let (mut opened, stats) = self.refine(client)?;
         let seconds = start.elapsed().as_secs_f64();
         opened.session.set_field(field)?;
-        let warnings = needs.iter().filter_map(|named| needs::warning(&opened.session, &stats, named));
+        let shown =
+            self.shown_regions().map(|names| needs::find_regions(opened.mt()?, &names)).transpose()?;
+        opened.session.show_regions(shown.as_deref());
+        // A point may well be outside.
+        let told = needs.iter().filter(|_| self.narrowed(scope).is_none());
+        let warnings = told.filter_map(|named| needs::warning(&opened.session, &stats, named));
         warnings.for_each(|warning| output::note(&format!("warning: {warning}")));
         let summary = summary(&opened, field, &stats, &needs)?;
-        Ok(Answer { opened, field, needs, stats, seconds, summary })
+        let of_one_time = self.group.time().is_some();
+        Ok(Answer { opened, field, of_one_time, needs, stats, seconds, summary })
     }
 
     /// Refines until the request is met or a limit of time or updates is reached.
@@ -218,11 +281,22 @@ struct Report<'a, T> {
     seconds: f64,
 }
 
+/// What a mesh is for, beside what the options say.
+#[derive(Default)]
+pub struct Scope {
+    /// Whether it meets the needs at all time steps of the field. The first is shown.
+    pub at_all_times: bool,
+    /// Where alone it is needed, if the options do not say where it is.
+    pub places: Vec<Region>,
+}
+
 /// A mesh that answers a query.
 pub struct Answer {
     pub opened: Opened,
     /// Which field was asked for.
     pub field: usize,
+    /// Whether its time was asked for.
+    of_one_time: bool,
     pub needs: Vec<NamedNeed>,
     pub stats: RefineStats,
     /// What refinement took.
@@ -234,6 +308,9 @@ pub struct Answer {
 #[derive(Serialize)]
 pub struct Summary {
     pub field: String,
+    /// Of the step of the field, if it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
     pub vertices: u32,
     pub tetrahedra: u32,
     pub updates_applied: u32,
@@ -302,6 +379,7 @@ fn summary(opened: &Opened, number: usize, stats: &RefineStats, needs: &[NamedNe
     let field = &info.fields[number];
     Ok(Summary {
         field: field.name.clone(),
+        time: field.time,
         vertices: stats.vertices,
         tetrahedra: stats.tetrahedra,
         updates_applied: stats.applied,
@@ -324,6 +402,12 @@ fn summary(opened: &Opened, number: usize, stats: &RefineStats, needs: &[NamedNe
 }
 
 impl Summary {
+    /// The field and its time, for people.
+    pub fn field(&self) -> String {
+        let time = self.time.map(|time| format!(" at time {}", output::exact(time)));
+        self.field.clone() + &time.unwrap_or_default()
+    }
+
     /// The summary for people: a line for each number.
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let bound = match (self.error_bound, self.relative_error_bound) {
@@ -333,7 +417,7 @@ impl Summary {
             _ => "not known yet".to_owned(),
         };
         let mut rows = vec![
-            ("field", self.field.clone()),
+            ("field", self.field()),
             ("vertices", output::count(self.vertices)),
             ("tetrahedra", output::count(self.tetrahedra)),
             ("updates applied", output::count(self.updates_applied)),
@@ -343,7 +427,9 @@ impl Summary {
             rows.push(("boundary within", output::number(bound)));
         }
         // One need of the field says no more than the bound.
-        if self.needs.len() > 1 || self.needs.iter().any(|need| need.unit != needs::RELATIVE) {
+        if self.needs.iter().any(|need| need.need != self.needs[0].need)
+            || self.needs.iter().any(|need| need.unit != needs::RELATIVE)
+        {
             rows.extend(self.needs.iter().map(|need| ("need", need.sentence())));
         }
         let [read, all] = [self.bytes_read, self.file_bytes].map(output::bytes);
@@ -375,9 +461,23 @@ impl NeedReport {
 }
 
 impl Answer {
-    /// The names of all fields, in the order of the MT.
-    pub fn field_names(&self) -> Result<Vec<String>> {
-        Ok(self.opened.info()?.fields.iter().map(|field| field.name.clone()).collect())
+    /// The fields that results have, by their numbers, and their names: all, or if a time is asked for those of that time and of none. Of several
+    /// steps of one field each has its time behind its name.
+    pub fn written_fields(&self) -> Result<Vec<(usize, String)>> {
+        let info = self.opened.info()?;
+        let now = info.fields[self.field].time;
+        let is_written = |&field: &usize| {
+            let time = info.fields[field].time;
+            !self.of_one_time || time.is_none() || time == now
+        };
+        let name = |field: usize| {
+            let FieldInfo { name, time, .. } = &info.fields[field];
+            match time.filter(|_| steps::all_of(info, field).filter(is_written).count() > 1) {
+                Some(time) => format!("{name}@{time:?}"),
+                None => name.clone(),
+            }
+        };
+        Ok((0..info.fields.len()).filter(is_written).map(|field| (field, name(field))).collect())
     }
 
     /// A surface or lines of the mesh at these points, without anything else: what is written of it keeps the steps of the lattice.
@@ -386,15 +486,15 @@ impl Answer {
         Ok(PolyData { positions, step, ..PolyData::default() })
     }
 
-    /// Values of each field at points: what is written of them keeps the levels of the field.
-    pub fn point_values(&self, values: impl IntoIterator<Item = Vec<f64>>) -> Result<Vec<PointValues>> {
+    /// What is written of the values of all fields at points: it keeps the levels of the field.
+    pub fn point_values(&self, mut values: Vec<Vec<f64>>) -> Result<Vec<PointValues>> {
         let fields = &self.opened.info()?.fields;
-        let named = |(field, values): (&FieldInfo, Vec<f64>)| PointValues {
-            name: field.name.clone(),
-            values,
-            step: field.step,
+        let named = |(field, name): (usize, String)| PointValues {
+            name,
+            values: std::mem::take(&mut values[field]),
+            step: fields[field].step,
         };
-        Ok(fields.iter().zip(values).map(named).collect())
+        Ok(self.written_fields()?.into_iter().map(named).collect())
     }
 
     /// All fields at the vertices of the mesh, in the order of the MT.

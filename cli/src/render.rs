@@ -1,18 +1,25 @@
 //! `tetralod render`: a picture of the mesh.
 
+mod movie;
+mod picture;
 mod shown;
 
+use super::deform::Displaced;
 use super::parse::{one_of, parse_numbers, parse_positive};
-use super::query::{Query, Summary};
-use super::{files, output};
+use super::query::{Query, Scope, Summary};
+use super::{files, output, steps};
 use anyhow::{Context, Result, anyhow};
 use indicatif::ProgressBar;
+use movie::{Frame, Movie, Target, parse_output};
+use picture::Picture;
 use serde::Serialize;
 use shown::{About, Shown};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::geom::{Bounds, Camera, CameraState, Projection, ViewPreset};
+use tetralod::mesh::Averaged;
+use tetralod::mt::MtInfo;
+use tetralod::session::Session;
 use tetralod_render::gpu::{GpuError, Renderer, wait};
 use tetralod_render::scene::{Background, Legend};
 use tetralod_render::{SceneRenderer, ShowError};
@@ -26,15 +33,17 @@ const USUAL: [u32; 2] = [1280, 960];
 /// Draws a picture of the mesh: isosurfaces, the volume, sections, the boundary, tetrahedra, together if need
 /// be.
 ///
-/// It draws with Vulkan, on a GPU or in software. The same command gives the same picture on the same device.
+/// It draws with Vulkan, on a GPU or in software. The same command gives the same picture on the same device. Movies are several pictures: a .png
+/// gives one file each with a number (a-0001.png, …), a .gif or .apng has all.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples: tetralod render engine.mt --isovalue 0.3 --isovalue 0.6 --opacity 50% --error 1% -o engine.png
           tetralod render engine.mt --mode boundary,wire --clip z=0.5 --map turbo --from +x -o inside.png
-          tetralod render engine.mt --mode cells --colour-by depth --shrink 20% --cut x=0.5 -o cells.png")]
+          tetralod render engine.mt --mode cells --colour-by depth --shrink 20% --cut x=0.5 -o cells.png
+          tetralod render engine.mt --turntable 72 --size 640x480 --error 1% -o engine.gif")]
 pub struct Arguments {
-    /// The picture to write, a .png file.
-    #[arg(short, long, value_name = "FILE", value_parser = parse_png, required_unless_present = "print_scene")]
+    /// The picture to write, a .png file; of a movie a .gif, an .apng, or .png files with numbers.
+    #[arg(short, long, value_name = "FILE", value_parser = parse_output, required_unless_present = "print_scene")]
     output: Option<PathBuf>,
     #[command(flatten)]
     query: Query,
@@ -42,6 +51,8 @@ pub struct Arguments {
     shown: Shown,
     #[command(flatten)]
     placed: Placed,
+    #[command(flatten)]
+    movie: Movie,
     /// Width and height in pixels.
     #[arg(
         long,
@@ -108,22 +119,26 @@ fn parse_dimensions(text: &str) -> Result<[u32; 2], String> {
     Ok([width.ok_or_else(wrong)?, height.ok_or_else(wrong)?])
 }
 
-fn parse_png(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    if files::ending(&path) == "png" { Ok(path) } else { Err("the file's name must end in .png".to_owned()) }
-}
-
 impl Placed {
-    fn camera(&self, bounds: &Bounds, aspect: f64) -> Camera {
+    /// The camera of each picture, at one distance from the middle: the largest at which one of them shows all.
+    fn cameras(&self, bounds: &Bounds, aspect: f64, frames: &[Frame]) -> Vec<Camera> {
+        let all = frames.iter().map(|frame| self.camera(bounds, aspect, frame.turned));
+        let mut cameras: Vec<Camera> = all.collect();
+        let farthest = cameras.iter().map(Camera::distance).fold(0.0, f64::max);
+        cameras.iter_mut().for_each(|camera| camera.zoom(farthest / camera.distance() / self.zoom));
+        cameras
+    }
+
+    /// The camera that shows all, `turned` by so many degrees around it.
+    fn camera(&self, bounds: &Bounds, aspect: f64, turned: f64) -> Camera {
         let mut camera = Camera::home(bounds, aspect);
         if self.orthographic {
             camera.set_projection(Projection::Orthographic);
         }
         camera.turn_to(self.from);
         let [yaw, pitch] = self.turn.map(f64::to_radians);
-        camera.orbit(yaw, pitch);
+        camera.orbit(yaw + turned.to_radians(), pitch);
         camera.fit(bounds, aspect);
-        camera.zoom(1.0 / self.zoom);
         camera
     }
 }
@@ -131,12 +146,21 @@ impl Placed {
 /// The result as programs get it.
 #[derive(Serialize)]
 struct Report {
+    /// Of a movie, how many there are, how many in a second of a file that has all, and their times if they are time steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pictures: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fps: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    times: Option<Vec<f64>>,
     width: u32,
     height: u32,
     samples: u32,
-    /// Of isosurfaces, sections, the boundary, tubes and arrows.
+    /// Of isosurfaces, sections, the boundary, tubes and arrows; this and what follows is of the first picture.
     triangles: usize,
     colours: Option<Colours>,
+    #[serde(flatten)]
+    displaced: Option<Displaced>,
     camera: CameraState,
     device: String,
 }
@@ -149,17 +173,27 @@ struct Colours {
     range: [f64; 2],
     log: bool,
     reversed: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bands: Option<u8>,
+    /// What averaging has done to the field that is shown, if the input has it at cells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    averaged: Option<Averaged>,
 }
 
 impl Colours {
-    fn of(legend: &Legend) -> Self {
+    /// Of a legend; `number` is that of the field that is shown, which may be one of several time steps.
+    fn of(legend: &Legend, info: &MtInfo, number: usize) -> Self {
         let scale = &legend.scale;
+        let fields = info.fields[number..=number].iter().chain(&info.fields);
+        let field = fields.into_iter().find(|field| field.name == legend.label);
         Self {
             of: legend.label.clone(),
             map: scale.map.name,
             range: scale.range,
             log: scale.is_log,
             reversed: scale.is_reversed,
+            bands: (scale.bands > 1).then_some(scale.bands),
+            averaged: field.and_then(|field| field.averaged.clone()),
         }
     }
 
@@ -167,7 +201,13 @@ impl Colours {
         let [low, high] = output::ends(self.range);
         let log = if self.log { ", logarithmic" } else { "" };
         let reversed = if self.reversed { ", reversed" } else { "" };
-        format!("{} from {low} to {high} ({}{log}{reversed})", self.of, self.map)
+        let bands = self.bands.map_or_else(String::new, |bands| format!(", {bands} colours"));
+        let averaged = self.averaged.as_ref().map(|Averaged { input, .. }| {
+            let [low, high] = output::ends(input.both().map(|extreme| extreme.value));
+            format!(", averaged from cells; input {low} to {high}")
+        });
+        let averaged = averaged.unwrap_or_default();
+        format!("{} from {low} to {high} ({}{log}{reversed}{bands}){averaged}", self.of, self.map)
     }
 }
 
@@ -176,55 +216,122 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let Some(output) = arguments.output.as_ref().filter(|_| !arguments.print_scene) else {
         return print_scene(arguments);
     };
-    files::check_output(output, arguments.query.files().chain(arguments.shown.files()))?;
+    let (movie, target) = (&arguments.movie, arguments.movie.target(output));
+    files::check_output(&target.path(0), arguments.query.files().chain(arguments.shown.files()))?;
     // Whether it can draw shows before anything is read.
     let size = arguments.size;
     let renderer = renderer(size)?;
-    let mut answer = arguments.query.answer()?;
+    let of_all = movie.is_over_time();
+    let scope = Scope { at_all_times: of_all, ..Scope::default() };
+    let mut answer = arguments.query.answer_for(&scope)?;
     let start = Instant::now();
+    let info = answer.opened.info()?;
+    let steps = if of_all { steps::in_order(info, answer.field)? } else { Vec::new() };
+    let mut field = info.fields[answer.field].clone();
+    if of_all {
+        [field.min, field.max] = info.range_at_all_times(answer.field);
+    }
+    let times = of_all.then(|| steps.iter().filter_map(|&step| info.fields[step].time).collect());
     let about = About {
         bounds: answer.opened.session.view().bounds(),
         is_box: answer.opened.session.is_box() == Some(true),
-        field: &answer.opened.info()?.fields[answer.field],
+        field: &field,
     };
     let state = arguments.shown.state(&arguments.query, &about)?;
     shown::warnings(&state, &about).iter().for_each(|warning| output::note(&format!("warning: {warning}")));
-    let is_transparent = state.background == Background::Transparent;
-    let camera = arguments.placed.camera(&about.bounds, f64::from(size[0]) / f64::from(size[1]));
+    let frames = movie.frames(&steps);
     let mut scene = SceneRenderer::new(renderer);
     scene.set_pixel_ratio([0, 1].map(|k| size[k] as f32 / USUAL[k] as f32).into_iter().fold(1.0, f32::max));
-    scene.set_state(state).map_err(explained)?;
-    let session = &mut answer.opened.session;
-    scene.update(session).map_err(explained)?;
-    let bar = ProgressBar::new(u64::from(arguments.samples));
-    let picture = scene.picture(session, &camera, arguments.samples, |count| bar.set_position(count.into()));
-    let pixels = wait(picture).map_err(explained)?;
-    bar.finish_and_clear();
-    let report = Report {
-        width: size[0],
-        height: size[1],
-        samples: arguments.samples,
-        triangles: scene.triangles(),
-        colours: scene.legend().map(Colours::of),
-        camera: camera.state(),
-        device: scene.renderer().description(),
+    let bar = ProgressBar::new(frames.len() as u64 * u64::from(arguments.samples));
+    let (mut cameras, mut report) = (Vec::new(), None);
+    // The next pictures find the scene and the renderer as the one before has left them.
+    let draw = |number: usize| {
+        let (frame, session) = (frames[number], &mut answer.opened.session);
+        if let Some(step) = frame.step {
+            session.set_field(step)?;
+            answer.summary.time = session.info().and_then(|info| info.fields[step].time);
+        }
+        let mut state = state.clone();
+        if let (Some(deform), Some(phase)) = (&mut state.deform, frame.phase) {
+            deform.phase = Some(phase);
+        }
+        scene.set_state(state).map_err(explained)?;
+        scene.update(session).map_err(explained)?;
+        arguments.shown.check_steps(&arguments.query, session, scene.deformation())?;
+        if cameras.is_empty() {
+            let displaced = scene.deformation().and_then(|_| scene.shown_bounds(session));
+            let aspect = f64::from(size[0]) / f64::from(size[1]);
+            cameras = arguments.placed.cameras(&displaced.unwrap_or(about.bounds), aspect, &frames);
+        }
+        let camera = &cameras[number];
+        let before = number as u64 * u64::from(arguments.samples);
+        let drawn = |count: u32| bar.set_position(before + u64::from(count));
+        let pixels = wait(scene.picture(session, camera, arguments.samples, drawn)).map_err(explained)?;
+        let own = Report::of(arguments, &scene, session, camera)?;
+        let about = description(&arguments.query.file, &own, &answer.summary);
+        report.get_or_insert(own);
+        let is_transparent = scene.state().background == Background::Transparent;
+        Ok(Picture { size, pixels, is_transparent, about })
     };
-    let about = description(&arguments.query.file, &report, &answer.summary);
-    let picture = Picture { size, pixels: &pixels, is_transparent, about: &about };
-    files::write_file(output, |out| picture.write(out))?;
+    target.write(frames.len(), movie.rate(), draw)?;
+    bar.finish_and_clear();
+    let mut report = report.context("there is no picture")?;
+    if frames.len() > 1 {
+        report.pictures = Some(frames.len());
+        report.fps = target.is_animated().then(|| movie.rate());
+        report.times = times;
+        answer.summary.time = answer.summary.time.filter(|_| !of_all);
+    }
     let seconds = start.elapsed().as_secs_f64();
-    arguments.query.print(&report, rows(output, &report), (&answer.summary, seconds))
+    arguments.query.print(&report, rows(&target, &report), (&answer.summary, seconds))
 }
 
-fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
+impl Report {
+    /// Of a picture that has been drawn.
+    fn of(arguments: &Arguments, scene: &SceneRenderer, session: &Session, camera: &Camera) -> Result<Self> {
+        let info = session.info().context("the MT has no description")?;
+        let displaced = match (scene.deformation(), &scene.state().deform) {
+            (Some(deformation), Some(state)) => {
+                Some(Displaced::new(&state.field, deformation, info, session))
+            }
+            _ => None,
+        };
+        let [width, height] = arguments.size;
+        Ok(Self {
+            pictures: None,
+            fps: None,
+            times: None,
+            width,
+            height,
+            samples: arguments.samples,
+            triangles: scene.triangles(),
+            colours: scene.legend().map(|legend| Colours::of(legend, info, session.field())),
+            displaced,
+            camera: camera.state(),
+            device: scene.renderer().description(),
+        })
+    }
+}
+
+fn rows(target: &Target, report: &Report) -> Vec<(&'static str, String)> {
     let &Report { width, height, samples, .. } = report;
     let mean = if samples > 1 { format!(", mean of {samples} pictures") } else { String::new() };
-    let mut rows = vec![
-        ("file", output.display().to_string()),
-        ("size", format!("{width} x {height} pixels{mean}")),
-        ("triangles", output::count(report.triangles as u64)),
-    ];
+    let mut rows = vec![("file", target.path(0).display().to_string())];
+    if let Some(count) = report.pictures {
+        let last = target.path(count - 1);
+        let rate = report.fps.map(|rate| format!(", {} a second", output::number(rate)));
+        rows.push((
+            "pictures",
+            output::count(count as u64) + &rate.unwrap_or_else(|| format!(", the last {}", last.display())),
+        ));
+        if let Some([first, .., last]) = report.times.as_deref() {
+            rows.push(("times", [*first, *last].map(output::exact).join(" to ")));
+        }
+    }
+    rows.push(("size", format!("{width} x {height} pixels{mean}")));
+    rows.push(("triangles", output::count(report.triangles as u64)));
     rows.extend(report.colours.iter().map(|colours| ("colours", colours.sentence())));
+    rows.extend(report.displaced.iter().flat_map(Displaced::rows));
     rows.push(("drawn by", report.device.clone()));
     rows
 }
@@ -232,7 +339,7 @@ fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
 /// What the picture says of itself.
 fn description(file: &Path, report: &Report, mesh: &Summary) -> String {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let mut text = format!("{name}: {}, {}", mesh.field, output::mesh(mesh.vertices, mesh.tetrahedra));
+    let mut text = format!("{name}: {}, {}", mesh.field(), output::mesh(mesh.vertices, mesh.tetrahedra));
     if let Some(bound) = mesh.error_bound {
         text += &format!(", error at most {}", output::number(bound));
     }
@@ -248,7 +355,7 @@ fn print_scene(arguments: &Arguments) -> Result<()> {
     let mut opened = files::Opened::of(files::open_parts(&arguments.query.file).with_context(name)?);
     let bounds = opened.session.view().bounds();
     let info = opened.info()?;
-    let field = &info.fields[files::field_index(info, arguments.query.field()).with_context(name)?];
+    let field = &info.fields[arguments.query.field_index(info).with_context(name)?];
     let is_box = opened.session.is_box() == Some(true);
     output::json(&arguments.shown.state(&arguments.query, &About { bounds, is_box, field })?)
 }
@@ -286,58 +393,5 @@ fn explained(error: impl Into<ShowError>) -> anyhow::Error {
         }
         // The text of these holds that of their cause.
         other => anyhow!("{other}"),
-    }
-}
-
-/// A picture as it was drawn: premultiplied `RGBA`.
-struct Picture<'a> {
-    size: [u32; 2],
-    pixels: &'a [u8],
-    is_transparent: bool,
-    about: &'a str,
-}
-
-impl Picture<'_> {
-    fn write(&self, out: &mut impl Write) -> Result<()> {
-        let [width, height] = self.size;
-        let mut encoder = png::Encoder::new(out, width, height);
-        encoder.set_color(if self.is_transparent { png::ColorType::Rgba } else { png::ColorType::Rgb });
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        let software = concat!("tetralod ", env!("CARGO_PKG_VERSION"));
-        encoder.add_text_chunk("Software".to_owned(), software.to_owned())?;
-        encoder.add_itxt_chunk("Description".to_owned(), self.about.to_owned())?;
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.bytes())?;
-        Ok(writer.finish()?)
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        let pixels = self.pixels.as_chunks::<4>().0;
-        if self.is_transparent {
-            pixels.iter().copied().flat_map(straight).collect()
-        } else {
-            pixels.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).collect()
-        }
-    }
-}
-
-/// A pixel with its colour as it is without its opacity.
-fn straight([r, g, b, a]: [u8; 4]) -> [u8; 4] {
-    let [half, alpha] = [u32::from(a) / 2, u32::from(a).max(1)];
-    let [r, g, b] = [r, g, b].map(|c| ((u32::from(c) * 255 + half) / alpha).min(255) as u8);
-    [r, g, b, a]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn colours_come_out_of_their_opacity() {
-        assert_eq!(straight([0, 0, 0, 0]), [0, 0, 0, 0]);
-        assert_eq!(straight([10, 128, 255, 255]), [10, 128, 255, 255]);
-        assert_eq!(straight([64, 32, 0, 128]), [128, 64, 0, 128]);
-        assert_eq!(straight([9, 1, 0, 8]), [255, 32, 0, 8]);
     }
 }

@@ -22,7 +22,8 @@ pub struct RestrictionOptions {
     #[arg(long, value_name = "DEG", value_parser = |text: &str| degrees(text, 1.0, 90.0), help_heading = KEEP)]
     pub feature_angle: Option<f64>,
     /// Keep the surfaces between cells of which this label differs, as those of materials (repeatable): integers at cells, or at points,
-    /// of which a cell has the least one. Flat parts of them are still made coarser. With method decimate.
+    /// of which a cell has the least one; or `components`, the parts that hang together by faces. Flat parts of these surfaces are still made
+    /// coarser. With method decimate.
     #[arg(long = "preserve", value_name = "LABEL", help_heading = KEEP)]
     pub preserve: Vec<String>,
     /// Let curved parts of these surfaces move by so many model units at most, where they have two regions beside them and do not end.

@@ -1,5 +1,6 @@
 //! `tetralod slice`: the mesh in a plane.
 
+use super::deform::{Deform, Displaced};
 use super::output;
 use super::parse::parse_plane;
 use super::poly::{Amount, Target};
@@ -28,6 +29,8 @@ pub struct Arguments {
     /// The surface to write: .vtp, .stl (without edges), .ply, .obj, .npz, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
+    #[command(flatten)]
+    deform: Deform,
 }
 
 /// The result as programs get it.
@@ -37,12 +40,15 @@ struct Report {
     surface: Amount,
     #[serde(skip_serializing_if = "Option::is_none")]
     edges: Option<usize>,
+    #[serde(flatten)]
+    displaced: Option<Displaced>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;
     let fields = answer.all_values()?;
+    let (deformation, displaced) = arguments.deform.of(&arguments.query, &answer)?.unzip();
     let mesh = answer.opened.session.view();
     let start = Instant::now();
     let mut slice = Slice::new();
@@ -53,18 +59,24 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let seconds = start.elapsed().as_secs_f64();
     let values: Vec<Vec<f64>> = fields.iter().map(|field| slice.interpolate(&mesh, field)).collect();
+    // The section with the plane, displaced.
+    let positions = deformation.map_or_else(
+        || slice.positions().to_vec(),
+        |by| by.moved(slice.positions(), by.fields.map(|field| values[field].as_slice())),
+    );
     let data = PolyData {
         fields: answer.point_values(values)?,
         triangles: slice.indices().to_vec(),
         lines: edges.iter().map(|edge| edge.to_vec()).collect(),
-        ..answer.poly_data(slice.positions().to_vec())?
+        ..answer.poly_data(positions)?
     };
     let origin = arguments.output.write(&data)?;
     let edges = arguments.edges.then_some(edges.len());
-    let report = Report { surface: Amount::of(&data, origin), edges };
+    let report = Report { surface: Amount::of(&data, origin), edges, displaced };
     let mut rows = report.surface.rows(&arguments.output);
     if let Some(edges) = edges {
         rows.push(("cell edges", output::count(edges as u64)));
     }
+    rows.extend(report.displaced.iter().flat_map(Displaced::rows));
     arguments.query.print(&report, rows, (&answer.summary, seconds))
 }

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
-use tetralod::mt::FieldInfo;
+use tetralod::mt::MtInfo;
 use tetralod::view::{StreamPoint, Streamline, TraceOptions, Tracer};
 use tetralod_io::{PointValues, PolyData};
 
@@ -140,9 +140,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;
     let info = answer.opened.info()?;
-    let components = components(&info.fields, &arguments.vector)
-        .with_context(|| arguments.query.file.display().to_string())?;
-    let names = answer.field_names()?;
+    let name = || arguments.query.file.display().to_string();
+    let components = components(info, answer.field, &arguments.vector).with_context(name)?;
+    arguments.query.check_step(info, answer.field, components[0]).with_context(name)?;
+    let vector = components.map(|f| info.fields[f].name.clone()).to_vec();
     let start = Instant::now();
     let fields = answer.all_values()?;
     let mesh = answer.opened.session.view();
@@ -165,7 +166,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let seconds = start.elapsed().as_secs_f64();
     let values = |f: usize| lines.points.iter().map(|p| p.place.interpolate(&mesh, &fields[f])).collect();
-    let columns: Vec<Vec<f64>> = (0..names.len()).map(values).collect();
+    let columns: Vec<Vec<f64>> = (0..fields.len()).map(values).collect();
     let columns = answer.point_values(columns)?;
     let positions = lines.points.iter().map(|point| point.position).collect();
     let data = poly_data(&lines, &columns, answer.poly_data(positions)?);
@@ -176,15 +177,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         lines: lines.lines.len(),
         points: lines.points.len(),
         ends: lines.ends,
-        vector: components.map(|f| names[f].clone()).to_vec(),
+        vector,
     };
     arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
 }
 
-/// The fields that are the components of a vector.
-fn components(fields: &[FieldInfo], vector: &str) -> Result<[usize; 3]> {
+/// The fields that are the components of a vector, at the time of the field that is asked for.
+fn components(info: &MtInfo, shown: usize, vector: &str) -> Result<[usize; 3]> {
     let numbers = |names: [String; 3]| {
-        let found = names.map(|name| fields.iter().position(|field| field.name == name));
+        let found = names.map(|name| info.step_of(&name, shown));
         let [Some(x), Some(y), Some(z)] = found else { return None };
         Some([x, y, z])
     };
@@ -202,7 +203,7 @@ fn components(fields: &[FieldInfo], vector: &str) -> Result<[usize; 3]> {
         Err(_) => suffixes.iter().find_map(|ends| numbers(ends.map(|end| format!("{vector}{end}")))),
     };
     found.with_context(|| {
-        let known = fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>().join(", ");
+        let known = info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>().join(", ");
         format!("there is no vector field '{vector}': give the names of three of the fields {known}")
     })
 }

@@ -43,10 +43,10 @@ fn by_facts(mt: &impl Codec, facts: &MtFacts, options: &EncodeOptions) -> Result
 
 /// What the index says of each page, given what it reaches.
 fn blocks(mt: &impl ApplyUpdates, reaches: Vec<Extent>) -> Vec<BlockInfo> {
-    let block = |(page, Extent { bounds, ranges }): (u32, Extent)| {
+    let block = |(page, Extent { bounds, ranges, regions }): (u32, Extent)| {
         let largest = |f: usize| mt.page_updates(page).map(|u| mt.error_of_field(UpdateId(u), f)).max();
         let errors = (0..ranges.len()).map(|f| largest(f).unwrap_or(ErrorCode::ZERO)).collect();
-        BlockInfo { lengths: Vec::new(), bounds, errors, ranges }
+        BlockInfo { lengths: Vec::new(), bounds, errors, ranges, regions }
     };
     (0..).zip(reaches).map(block).collect()
 }
@@ -92,10 +92,15 @@ fn scan(
     }
     let mut own = Extent::empty(mt.info().fields.len());
     widen(&mut own, mesh, &removed);
+    let regions = mesh.regions_of(&removed);
     apply_next(mt, mesh, u).map_err(EncodeError::Update)?;
     let inserted = mt.find_inserted(mesh, u).map_err(EncodeError::Update)?;
     widen(&mut own, mesh, &inserted);
     reaches.push(own.bounds, &own.ranges, &parents);
+    if mt.regions().is_some() {
+        // What it inserts is in the same ones.
+        reaches.push_regions(regions);
+    }
     Ok(())
 }
 

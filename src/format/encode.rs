@@ -98,13 +98,13 @@ fn sections<C: Codec>(
     put_base(&mut counts, mt);
     exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
     let models = Models::new(&counts);
-    let shared = shared_sections(mt, &models, scan.histograms.as_ref())?;
+    let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks: scan.blocks };
+    let shared = shared_sections(mt, &models, scan.histograms.as_ref(), &index)?;
     let of_blocks = mt.sections(&models)?;
     let mut payload = Vec::new();
     payload::write_info(&mut payload, mt.info(), metadata)?;
     let mut sections = vec![Section::new(Kind::INFO, payload)?];
     if mt.info().kind.is_paged() {
-        let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks: scan.blocks };
         index.round(mt.info());
         index.shared = shared.iter().map(Section::len).sum();
         for (block, sections) in index.blocks.iter_mut().zip(&of_blocks) {
@@ -126,6 +126,7 @@ fn shared_sections<C: Codec>(
     mt: &C,
     models: &Models,
     histograms: Option<&Histograms>,
+    index: &Index,
 ) -> Result<Vec<Section>, EncodeError> {
     let mut shared = Vec::new();
     if let Some(histograms) = histograms {
@@ -133,6 +134,16 @@ fn shared_sections<C: Codec>(
     }
     if let Some(bounds) = mt.info().bounds {
         shared.push(Section::written(Kind::BOUNDS, |out| payload::bounds::write(out, bounds))?);
+    }
+    if payload::extremes::are_known(&mt.info().fields) {
+        let mut payload = Vec::new();
+        payload::extremes::write(&mut payload, &mt.info().fields)?;
+        shared.push(Section::new(Kind::EXTREMES, payload)?);
+    }
+    if let Some(regions) = mt.regions() {
+        let mut payload = Vec::new();
+        payload::regions::write(&mut payload, regions, index)?;
+        shared.push(Section::new(Kind::REGIONS, payload)?);
     }
     shared.push(Section::written(Kind::MODL, |out| models.write(out))?);
     let mut payload = Vec::new();

@@ -93,6 +93,10 @@ impl Kind {
     pub const HIST: Self = Self(*b"hist");
     /// The box around the reference mesh: those who do not know it take a larger one.
     pub const BOUNDS: Self = Self(*b"bbox");
+    /// The extremes of the fields: those who do not know it do without.
+    pub const EXTREMES: Self = Self(*b"extr");
+    /// Regions of the volume: those who do not know it do without.
+    pub const REGIONS: Self = Self(*b"regn");
     pub const MODL: Self = Self(*b"MODL");
     pub const BASE: Self = Self(*b"BASE");
     pub const FLDB: Self = Self(*b"FLDB");
@@ -106,9 +110,10 @@ impl Kind {
 
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
-        let head = [Self::INFO, Self::INDX, Self::HIST, Self::BOUNDS, Self::MODL, Self::BASE, Self::FLDB];
+        let front = [Self::INFO, Self::INDX, Self::HIST, Self::BOUNDS, Self::EXTREMES, Self::REGIONS];
+        let head = [Self::MODL, Self::BASE, Self::FLDB];
         let blocks = [Self::UPDT, Self::HALF, Self::FLDU, Self::INSV, Self::EXACT, Self::ENDF];
-        head.contains(&self) || blocks.contains(&self)
+        front.contains(&self) || head.contains(&self) || blocks.contains(&self)
     }
 
     /// Whether a reader that does not know the kind may skip the section.

@@ -149,6 +149,13 @@ impl Camera {
         camera
     }
 
+    /// What there is to see is all in `bounds` from now on; nothing moves. Empty or unbounded boxes change nothing.
+    pub fn set_model(&mut self, bounds: &Bounds) {
+        if has_size(bounds) {
+            (self.centre, self.radius) = (middle(bounds), bounds.diagonal() / 2.0);
+        }
+    }
+
     /// The camera that sees the same of a model whose points are stored in single precision.
     pub fn relative_to(&self, single: &SinglePoints) -> Self {
         let place = |p: DVec3| DVec3::from(single.relative(p.into()));

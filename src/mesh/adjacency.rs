@@ -216,7 +216,7 @@ pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError>
 pub(crate) fn topology_of(points: usize, tets: &[[u32; 4]], neighbors: Vec<[u32; 4]>) -> Topology {
     let boundary_faces = neighbors.iter().flatten().filter(|&&n| n == NONE).count();
     let non_manifold = non_manifold(points, tets, &neighbors, |_| true);
-    Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors }
+    Topology { components: components(&neighbors).count(), boundary_faces, non_manifold, neighbors }
 }
 
 /// So many vertices are looked at by one thread at a time.
@@ -355,15 +355,15 @@ impl DisjointSets {
     }
 }
 
-/// Parts that hang together by faces.
-pub(crate) fn components(neighbors: &[[u32; 4]]) -> usize {
+/// The parts that hang together by faces: groups of tetrahedra.
+pub(crate) fn components(neighbors: &[[u32; 4]]) -> DisjointSets {
     let mut groups = DisjointSets::of(neighbors.len());
     for (t, sides) in neighbors.iter().enumerate() {
         for &n in sides.iter().filter(|&&n| n != NONE) {
             groups.join(t, n as usize);
         }
     }
-    groups.count
+    groups
 }
 
 #[cfg(test)]

@@ -1,10 +1,18 @@
 //! A set of small numbers.
 
 /// A set of small numbers, with one bit for each; it grows as needed.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[doc(hidden)]
 pub struct BitSet {
     words: Vec<u64>,
+}
+
+impl FromIterator<u32> for BitSet {
+    fn from_iter<T: IntoIterator<Item = u32>>(numbers: T) -> Self {
+        let mut set = Self::default();
+        numbers.into_iter().for_each(|i| _ = set.insert(i));
+        set
+    }
 }
 
 impl BitSet {
@@ -47,13 +55,5 @@ impl BitSet {
     /// Has words for the numbers below `len`, and at least one.
     pub fn resize(&mut self, len: u32) {
         self.words.resize(len.div_ceil(64).max(1) as usize, 0);
-    }
-
-    /// Takes out all numbers from `len` on.
-    pub fn truncate(&mut self, len: u32) {
-        self.words.truncate(len.div_ceil(64) as usize);
-        if let Some(word) = self.words.get_mut(len as usize / 64) {
-            *word &= (1 << (len % 64)) - 1;
-        }
     }
 }

@@ -1,12 +1,49 @@
-//! Fields at cells as fields at points.
+//! Fields at cells: as fields at points, and as labels.
 
 use crate::geom::bits_of;
-use crate::mesh::{Field, TetMesh};
-use std::collections::HashSet;
+use crate::mesh::adjacency::components;
+use crate::mesh::{Averaged, Difference, Extreme, Extremes, Field, MeshInput, TetMesh, neighbors};
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+
+/// The label that is the number of the part that a cell is in.
+pub const COMPONENTS: &str = "components";
 
 impl TetMesh {
+    /// Turns fields at cells into fields at points, or leaves their values out. Those that are labels stay as well; the label
+    /// [`COMPONENTS`] is made where there is none of this name, and the mesh is sound.
+    #[doc(hidden)]
+    pub fn settle_cells(&mut self, to_points: bool, labels: &[String]) {
+        let is_label = |field: &&Field| labels.contains(&field.name);
+        let kept: Vec<Field> = self.cell_fields.iter().filter(is_label).cloned().collect();
+        match to_points {
+            true => self.cells_to_points(),
+            false => self.cell_fields.iter_mut().for_each(|field| field.values = Vec::new()),
+        }
+        self.cell_fields.extend(kept);
+        let is_it = |field: &Field| field.name == COMPONENTS;
+        let MeshInput { other_fields, other_cell_fields, .. } = &self.input;
+        let mut known =
+            self.cell_fields.iter().chain(&self.fields).chain(other_fields).chain(other_cell_fields);
+        if labels.iter().any(|name| name == COMPONENTS) && !known.any(is_it) {
+            self.cell_fields.extend(self.components());
+        }
+    }
+
+    /// The parts that hang together by faces, counted from 1 in the order of their first cells.
+    fn components(&self) -> Option<Field> {
+        let mut groups = components(&neighbors(&self.tets).ok()?);
+        let mut numbers = HashMap::new();
+        let number = |t: usize| {
+            let next = numbers.len() + 1;
+            *numbers.entry(groups.root(t)).or_insert(next) as f64
+        };
+        Some(Field::new(COMPONENTS, (0..self.tets.len()).map(number).collect()))
+    }
+
     /// Turns the fields at cells that have values into fields at points: the mean of the cells around a point, weighted
-    /// by volume. A name that a field at points has already gets `_cells` behind it.
+    /// by volume. A name that a field at points has already gets `_cells` behind it. What that has done to the values is in
+    /// [`Field::averaged`].
     ///
     /// Points without cells get 0; [`repair`](crate::mesh::repair) drops them, and turns cells whose volume would
     /// otherwise count as negative.
@@ -23,7 +60,9 @@ impl TetMesh {
         let key = |field: &Field| (field.name.clone(), field.time.map(bits_of));
         let mut taken: HashSet<_> = self.fields.iter().map(key).collect();
         for mut field in read {
-            field.values = self.mean_of_cells(&field.values, &volumes);
+            let means = self.mean_of_cells(&field.values, &volumes);
+            field.averaged = self.averaged(&field.values, &means, &volumes);
+            field.values = means;
             field.integer = false;
             while !taken.insert(key(&field)) {
                 field.name.push_str("_cells");
@@ -33,12 +72,16 @@ impl TetMesh {
         }
     }
 
+    /// The mean at each point of the cells around it, weighted by their volumes: however they are split into tetrahedra.
     fn mean_of_cells(&self, values: &[f64], volumes: &[f64]) -> Vec<f64> {
         let mut means = vec![0.0; self.positions.len()];
         let mut weights = vec![0.0; self.positions.len()];
-        for ((tet, value), volume) in self.tets.iter().zip(values).zip(volumes) {
-            for &v in tet {
-                let v = v as usize;
+        for cell in self.cells() {
+            let (value, volume) = (values[cell.start], volumes[cell.clone()].iter().sum::<f64>());
+            let mut corners: Vec<u32> = self.tets[cell].as_flattened().to_vec();
+            corners.sort_unstable();
+            corners.dedup();
+            for v in corners.into_iter().map(|v| v as usize) {
                 weights[v] += volume;
                 // A running mean stays between the values that it is of: no sum that could overflow.
                 if weights[v] > 0.0 {
@@ -48,6 +91,70 @@ impl TetMesh {
             }
         }
         means
+    }
+
+    /// What averaging has done: `values` of cells have become `means` at points.
+    fn averaged(&self, values: &[f64], means: &[f64], volumes: &[f64]) -> Option<Averaged> {
+        let mut ends: Option<[Range<usize>; 2]> = None;
+        let (mut largest, mut squares, mut whole) = (0.0_f64, 0.0, 0.0);
+        for cell in self.cells() {
+            let value = values[cell.start];
+            let (mut volume, mut mean) = (0.0, 0.0);
+            for t in cell.clone() {
+                volume += volumes[t];
+                let share = volumes[t] / volume;
+                let of_tet: f64 = self.tets[t].iter().map(|&v| 0.25 * means[v as usize]).sum();
+                mean = mean * (1.0 - share) + of_tet * share;
+            }
+            let difference = (mean - value).abs();
+            // In units of the largest one so far, no square overflows.
+            if difference > largest {
+                squares *= (largest / difference) * (largest / difference);
+                largest = difference;
+            }
+            if largest > 0.0 {
+                squares += volume * (difference / largest) * (difference / largest);
+            }
+            whole += volume;
+            match &mut ends {
+                None => ends = Some([cell.clone(), cell]),
+                Some([least, _]) if value < values[least.start] => *least = cell,
+                Some([_, most]) if value > values[most.start] => *most = cell,
+                Some(_) => {}
+            }
+        }
+        let [min, max] = ends?.map(|cell| self.extreme(values[cell.start], cell, volumes));
+        let rms = largest * (squares / whole).sqrt();
+        Some(Averaged { input: Extremes { min, max }, difference: Difference { rms, largest } })
+    }
+
+    /// The tetrahedra of each cell of the input, which follow one another.
+    fn cells(&self) -> impl Iterator<Item = Range<usize>> {
+        let cell_of = |t: usize| self.input.cells.number(t as u32);
+        let mut end = 0;
+        std::iter::from_fn(move || {
+            let start = end;
+            end += 1;
+            while end < self.tets.len() && cell_of(end) == cell_of(start) {
+                end += 1;
+            }
+            (start < self.tets.len()).then_some(start..end)
+        })
+    }
+
+    /// A value of the cell with these tetrahedra.
+    fn extreme(&self, value: f64, cell: Range<usize>, volumes: &[f64]) -> Extreme {
+        let found = self.input.cells.cell_of(cell.start as u32);
+        let (mut volume, mut place) = (0.0, [0.0; 3]);
+        for t in cell {
+            volume += volumes[t];
+            let share = volumes[t] / volume;
+            for (k, x) in place.iter_mut().enumerate() {
+                let of_tet: f64 = self.tets[t].iter().map(|&v| 0.25 * self.positions[v as usize][k]).sum();
+                *x = *x * (1.0 - share) + of_tet * share;
+            }
+        }
+        Extreme { value, place, cell: Some(found.number), part: found.part }
     }
 
     /// Volumes in a unit in which none overflows, and none is 0 that is not almost flat.
@@ -82,6 +189,58 @@ mod tests {
         mesh.cells_to_points();
         assert_eq!(mesh.fields[0].values, [5.0, 5.0, 5.0, 8.0, 4.0]);
         assert!(mesh.cell_fields.is_empty());
+        // The means over the tetrahedra are 5.75 and 4.75; the second one has three quarters of the volume.
+        let found = mesh.fields[0].averaged.as_ref().expect("it was averaged");
+        let extreme = |value, z, cell| {
+            let place = [0.25, 0.25, z];
+            Extreme { value, place, cell: Some(cell), part: None }
+        };
+        assert_eq!(found.input, Extremes { min: extreme(4.0, -0.75, 1), max: extreme(8.0, 0.25, 0) });
+        assert_eq!(found.difference.largest, 2.25);
+        assert!((found.difference.rms - 1.6875_f64.sqrt()).abs() < 1e-15);
+    }
+
+    /// The first coordinate of each point and the value of the first field there.
+    fn by_x(mesh: &TetMesh) -> Vec<(f64, f64)> {
+        mesh.positions.iter().map(|p| p[0]).zip(mesh.fields[0].values.iter().copied()).collect()
+    }
+
+    #[test]
+    fn a_cell_that_is_split_is_one_cell() {
+        let grid = Grid { dims: [3, 2, 2], origin: [1.0, 2.0, 3.0], spacing: [2.0, 1.0, 4.0] };
+        let mut mesh = TetMesh::from_grid(grid, Vec::new());
+        mesh.input.cells = crate::mesh::CellNumbers::equal(2, 6, "cube");
+        let cubes = |values: [f64; 2]| values.into_iter().flat_map(|value| [value; 6]).collect();
+        mesh.cell_fields = vec![Field::new("a", cubes([7.0, 3.0])), Field::new("same", cubes([1.5; 2]))];
+        mesh.cells_to_points();
+        let [a, same] = [0, 1].map(|f| mesh.fields[f].averaged.clone().expect("it was averaged"));
+        for (found, value, cell, middle) in
+            [(&a.input.min, 3.0, 1, [4.0, 2.5, 5.0]), (&a.input.max, 7.0, 0, [2.0, 2.5, 5.0])]
+        {
+            assert_eq!((found.value, found.cell), (value, Some(cell)));
+            // The mean of six places is rounded.
+            assert!((0..3).all(|k| (found.place[k] - middle[k]).abs() < 1e-14), "{found:?}");
+        }
+        // Each cube counts once, however many of its tetrahedra are at a point.
+        let at_points = by_x(&mesh);
+        for (x, expected) in [(1.0, 7.0), (3.0, 5.0), (5.0, 3.0)] {
+            assert_eq!(at_points.iter().filter(|(at, _)| *at == x).count(), 4);
+            assert!(
+                at_points.iter().all(|(at, value)| *at != x || (value - expected).abs() < 1e-14),
+                "{at_points:?}"
+            );
+        }
+        // All tetrahedra of a cube have the same volume.
+        let middle = |t: &[u32; 4]| 0.25 * t.iter().map(|&v| mesh.fields[0].values[v as usize]).sum::<f64>();
+        let mean = |cube: usize| mesh.tets[6 * cube..][..6].iter().map(middle).sum::<f64>() / 6.0;
+        let differences = [7.0 - mean(0), mean(1) - 3.0];
+        let squares = differences.map(|x| x * x);
+        assert!((a.difference.largest - differences[0].max(differences[1])).abs() < 1e-12, "{a:?}");
+        assert!((a.difference.rms - (0.5 * (squares[0] + squares[1])).sqrt()).abs() < 1e-12, "{a:?}");
+        let Difference { rms, largest } = same.difference;
+        assert!(rms < 1e-14 && largest < 1e-14, "{same:?}");
+        // Of equal values it is the first cell.
+        assert_eq!([same.input.min.cell, same.input.max.cell], [Some(0); 2]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Scalar fields at points or cells of a mesh.
 
+use crate::mesh::Averaged;
 use serde::Serialize;
 
 /// A scalar field with one value per point (or per tetrahedron), and what is known of it.
@@ -17,6 +18,8 @@ pub struct Field {
     pub time: Option<f64>,
     /// Whether the values are integers by the type that the file gave them.
     pub integer: bool,
+    /// What averaging has done to it, if the input has its values at cells.
+    pub averaged: Option<Averaged>,
 }
 
 impl Field {
@@ -28,9 +31,17 @@ impl Field {
     /// What is known of it, but for its values.
     #[doc(hidden)]
     pub fn without_values(&self) -> Self {
-        let Self { name, unit, vector, time, integer, .. } = self;
+        let Self { name, unit, vector, time, integer, averaged, .. } = self;
         let (name, unit, vector) = (name.clone(), unit.clone(), vector.clone());
-        Self { name, values: Vec::new(), unit, vector, time: *time, integer: *integer }
+        Self {
+            name,
+            values: Vec::new(),
+            unit,
+            vector,
+            time: *time,
+            integer: *integer,
+            averaged: averaged.clone(),
+        }
     }
 
     /// Whether a user who asks for `name` means this field: it has this name, or it is a component (not the length) of
@@ -45,9 +56,19 @@ impl Field {
 pub struct VectorPart {
     /// The vector's name.
     pub name: String,
-    /// The component, from 0; none for the vector's length, which follows from the components.
+    /// The component, from 0; none for what follows from the components: the vector's length; von Mises' equivalent and the principal values of a
+    /// symmetric tensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<u8>,
+}
+
+/// Where among fields that one is which is kept where none is asked for: the first that is no label, does not number something or say where
+/// it is, and is no component; else the first.
+pub fn default_field(fields: &[Field], labels: &[String]) -> Option<usize> {
+    let tells = |field: &Field| !is_number_or_place(&field.name) && !labels.contains(&field.name);
+    let is_whole = |field: &Field| field.vector.as_ref().is_none_or(|part| part.component.is_none());
+    let first = |wanted: &dyn Fn(&Field) -> bool| fields.iter().position(wanted);
+    first(&|field| tells(field) && is_whole(field)).or_else(|| first(&tells)).or_else(|| first(&|_| true))
 }
 
 /// Words in the names of arrays that number something or say where it is, as the usual programs write them.
@@ -77,6 +98,10 @@ const NUMBERS_AND_PLACES: [&str; 23] = [
     "coord",
 ];
 
+/// Words in the names of quantities that have one of these words, too, such as a Mach number, or the real part of a pressure.
+const OF_QUANTITIES: [&str; 9] =
+    ["mach", "reynolds", "courant", "peclet", "prandtl", "nusselt", "real", "imaginary", "imag"];
+
 /// Whether the name of an array says that it numbers something, or where it is: that is seldom what is to be looked at. Words of names end at
 /// signs, and where a large letter follows a small one.
 pub fn is_number_or_place(name: &str) -> bool {
@@ -93,7 +118,8 @@ pub fn is_number_or_place(name: &str) -> bool {
         }
         before = c;
     }
-    words.iter().any(|word| NUMBERS_AND_PLACES.contains(&word.as_str()))
+    let is_one_of = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+    is_one_of(&NUMBERS_AND_PLACES) && !is_one_of(&OF_QUANTITIES)
 }
 
 #[cfg(test)]

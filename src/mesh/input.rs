@@ -1,5 +1,6 @@
 //! What is known of the input that a mesh was read from: for messages in its own numbers, and for what was left out.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -17,6 +18,8 @@ pub struct MeshInput {
     pub other_fields: Vec<Field>,
     /// Fields at cells that nobody asked for, without values.
     pub other_cell_fields: Vec<Field>,
+    /// What the input calls the whole numbers of a field at cells, by the name of that field: materials, physical groups, blocks.
+    pub label_names: BTreeMap<String, BTreeMap<i64, String>>,
     /// The files that it was read from.
     pub files: SourceFiles,
     /// The middles of its cells, until the mesh is passed on.
@@ -35,6 +38,9 @@ impl PartialEq for SourceFiles {
     }
 }
 
+/// Longer names of labels are cut off: formats that have names allow 127 bytes at most.
+const MOST_CHARACTERS: usize = 256;
+
 impl MeshInput {
     /// Notes that so many things were left out; nothing if there are none.
     pub fn leave_out(&mut self, count: u64, one: &str, many: &str) {
@@ -51,6 +57,26 @@ impl MeshInput {
         }
     }
 
+    /// Notes that so many points were added in cells, of which this is the first.
+    fn add_points(&mut self, count: u64, cell: u32) {
+        let known = self.notes.iter_mut().find_map(|note| match note {
+            Note::Added { points, .. } => Some(points),
+            _ => None,
+        });
+        match known {
+            Some(known) => *known += count,
+            None => self.notes.push(Note::Added { points: count, cell }),
+        }
+    }
+
+    /// Notes what a number of a field at cells is called; empty names say nothing, and of long ones the beginning is enough.
+    pub fn name_label(&mut self, field: &str, label: i64, name: &str) {
+        let name: String = name.trim().chars().take(MOST_CHARACTERS).collect();
+        if !name.is_empty() {
+            self.label_names.entry(field.to_owned()).or_default().insert(label, name);
+        }
+    }
+
     /// Notes something, once.
     pub fn say(&mut self, text: impl Into<String>) {
         let note = Note::Text(text.into());
@@ -61,6 +87,7 @@ impl MeshInput {
 
     /// Takes over what is known of another part of the input, whose tetrahedra follow those of this one.
     pub fn append(&mut self, part: Self) {
+        let before = self.cells.cells;
         self.cells.append(part.cells);
         self.files.0.extend(part.files.0);
         self.middles.append(part.middles);
@@ -68,6 +95,7 @@ impl MeshInput {
             match note {
                 Note::LeftOut { count, one, many } => self.leave_out(count, &one, &many),
                 Note::Text(text) => self.say(text),
+                Note::Added { points, cell } => self.add_points(points, before.saturating_add(cell)),
             }
         }
     }
@@ -79,6 +107,17 @@ impl MeshInput {
         let texts = self.notes.iter().filter_map(|note| match note {
             Note::Text(text) => Some(text.clone()),
             Note::LeftOut { .. } => None,
+            Note::Added { points, cell } => {
+                let cell = self.cells.cell(*cell);
+                Some(if *points == 1 {
+                    format!("added: 1 point in cell {cell}, with the mean of the values at its corners")
+                } else {
+                    format!(
+                        "added: {points} points in the middle of cells and faces, with the mean of the values at their corners (first: \
+                         cell {cell})"
+                    )
+                })
+            }
         });
         left_out.into_iter().chain(texts).collect()
     }
@@ -96,6 +135,13 @@ pub enum Note {
         /// And several.
         many: String,
     },
+    /// Points in the middle of cells and of their faces, where these cannot be split into tetrahedra between their corners.
+    Added {
+        /// How many.
+        points: u64,
+        /// The number of the first of these cells, numbered on over all parts of the input.
+        cell: u32,
+    },
     /// In words.
     Text(String),
 }
@@ -106,7 +152,7 @@ impl Note {
             Self::LeftOut { count, one, many } => {
                 Some(format!("{count} {}", if *count == 1 { one } else { many }))
             }
-            Self::Text(_) => None,
+            Self::Text(_) | Self::Added { .. } => None,
         }
     }
 }
@@ -161,7 +207,11 @@ impl CellNumbers {
 
     /// The cell that a tetrahedron is of.
     pub fn cell_of(&self, tet: u32) -> InputCell {
-        let cell = self.number(tet);
+        self.cell(self.number(tet))
+    }
+
+    /// The cell with a number that is numbered on over all parts.
+    fn cell(&self, cell: u32) -> InputCell {
         let first = |at: Option<usize>| at.and_then(|at| at.checked_sub(1));
         let kind = first(Some(self.kinds.partition_point(|(first, _)| *first <= cell)));
         let part = first(Some(self.parts.partition_point(|(first, _)| *first <= cell)));
@@ -258,6 +308,25 @@ mod tests {
 
     fn shown(cells: &CellNumbers) -> Vec<String> {
         (0..cells.tets as u32).map(|tet| cells.cell_of(tet).to_string()).collect()
+    }
+
+    #[test]
+    fn points_that_were_added_count_over_all_parts() {
+        let part = |name: &str, points: u64, cell: u32| {
+            let mut cells = CellNumbers::each(vec![0, 1, 1], 2, vec![(0, "polyhedron")]);
+            cells.name_part(name);
+            let notes = (points > 0).then_some(Note::Added { points, cell }).into_iter().collect();
+            MeshInput { cells, notes, ..MeshInput::default() }
+        };
+        let mut all = part("piece 0", 0, 0);
+        all.append(part("piece 1", 1, 1));
+        let one =
+            "added: 1 point in cell 1 of piece 1 (polyhedron), with the mean of the values at its corners";
+        assert_eq!(all.lines(), [one]);
+        all.append(part("piece 2", 3, 0));
+        let several = "added: 4 points in the middle of cells and faces, with the mean of the values at their corners (first: \
+                       cell 1 of piece 1 (polyhedron))";
+        assert_eq!(all.lines(), [several]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod cell_data;
 mod changed_blocks;
 mod check;
 mod error;
+mod extremes;
 mod field;
 mod geometry_field;
 mod grow;
@@ -25,11 +26,18 @@ mod tet_mesh;
 pub use adjacency::{DisjointSets, FaceTable, Topology, boundary_faces, match_faces, neighbors, topology};
 #[doc(hidden)]
 pub use bit_set::BitSet;
+#[doc(hidden)]
+pub use cell_data::COMPONENTS;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 #[doc(hidden)]
 pub use check::{check, check_arrays, check_topology};
 pub use error::MeshError;
-pub use field::{Field, VectorPart, is_number_or_place};
+pub use extremes::{Averaged, Extreme};
+#[doc(hidden)]
+pub use extremes::{Difference, Extremes};
+pub use field::{Field, VectorPart};
+#[doc(hidden)]
+pub use field::{default_field, is_number_or_place};
 #[doc(hidden)]
 pub use geometry_field::GeometryField;
 #[doc(hidden)]
@@ -54,6 +62,6 @@ pub use series::StepError;
 #[doc(hidden)]
 pub use straighten::straighten;
 #[doc(hidden)]
-pub use tet::{EDGES, MAX_TETS};
+pub use tet::{EDGES, MAX_TETS, REGION_COLORS};
 pub use tet::{FACES, NONE};
 pub use tet_mesh::{Grid, TetMesh};

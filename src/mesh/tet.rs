@@ -21,3 +21,6 @@ pub const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 
 
 /// Most tetrahedra in a mesh: its faces, four a tetrahedron, are counted in 32 bits.
 pub const MAX_TETS: usize = (1 << 30) - 1;
+
+/// How many distinct colours regions have: where more touch each other, two may have the same.
+pub const REGION_COLORS: u8 = 12;

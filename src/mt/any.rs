@@ -4,7 +4,7 @@ use super::replay::replay;
 use super::stats::bounds;
 use super::{
     Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ErrorCode, HalfEdgeMt, LookAtTet,
-    MtInfo, MultiTessellation, PageError, ReplayError, UpdateError, UpdateId, UpdatePages, VertexMt,
+    MtInfo, MultiTessellation, PageError, Regions, ReplayError, UpdateError, UpdateId, UpdatePages, VertexMt,
 };
 use enum_dispatch::enum_dispatch;
 use std::ops::Range;

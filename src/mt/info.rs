@@ -2,7 +2,8 @@
 
 use super::error::ErrorCode;
 use crate::geom::{Bounds, Lattice, SinglePoints, SingleValues};
-use crate::mesh::{Field, VectorPart, is_number_or_place};
+use crate::mesh::{Averaged, Difference, Extremes, Field, VectorPart, is_number_or_place};
+use serde::Serialize;
 
 /// Which kind of update an MT is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +69,10 @@ pub struct FieldInfo {
     /// vertex, in field units, rounded up: what the lattice of the values rounds off and, where the lattice of the positions moves
     /// vertices, what the field changes on the way. 0 if all are exact.
     pub quantization: f64,
+    /// The smallest and the largest value of the input at this time, and where the input has them; none if that is not known.
+    pub extremes: Option<Extremes>,
+    /// What averaging has done to it, if the input has its values at cells.
+    pub averaged: Option<Averaged>,
 }
 
 /// A nameless field of one bit, for `..FieldInfo::default()`.
@@ -84,6 +89,8 @@ impl Default for FieldInfo {
             vector: None,
             time: None,
             quantization: 0.0,
+            extremes: None,
+            averaged: None,
         }
     }
 }
@@ -146,7 +153,36 @@ pub struct MtInfo {
     pub bounds: Option<[[i32; 3]; 2]>,
 }
 
+/// A field that was averaged from cells: see [`MtInfo::averaged_fields`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AveragedField {
+    /// Its name.
+    pub name: String,
+    /// Its unit; empty if it is not known.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub unit: String,
+    /// The time that its values are of, if it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// The smallest and the largest value that the input has at cells.
+    pub input: Extremes,
+    /// The smallest and the largest value at points.
+    pub points: Extremes,
+    /// How far the field at points is from the values at cells.
+    pub difference: Difference,
+}
+
 impl MtInfo {
+    /// The fields that the input has at cells, and what averaging them to points has done.
+    pub fn averaged_fields(&self) -> Vec<AveragedField> {
+        let of = |field: &FieldInfo| {
+            let Averaged { input, difference } = field.averaged.clone()?;
+            let FieldInfo { name, unit, time, extremes, .. } = field.clone();
+            Some(AveragedField { name, unit, time, input, points: extremes?, difference })
+        };
+        self.fields.iter().filter_map(of).collect()
+    }
+
     /// How points are stored in single precision, in all meshes.
     pub fn single_points(&self) -> SinglePoints {
         SinglePoints::of(&self.lattice)
@@ -180,6 +216,13 @@ impl MtInfo {
         steps.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], step| {
             [low.min(step.min), high.max(step.max)]
         })
+    }
+
+    /// The field with a name at the time of the field that is shown, or else its first time step.
+    pub fn step_of(&self, name: &str, shown: usize) -> Option<usize> {
+        let time = self.fields.get(shown).and_then(|field| field.time);
+        let steps = || (0..self.fields.len()).filter(|&step| self.fields[step].name == name);
+        steps().find(|&step| self.fields[step].time == time).or_else(|| steps().next())
     }
 
     /// The field that is shown where none is asked for: the first that varies, is no component of a vector, and neither numbers something nor

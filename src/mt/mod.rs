@@ -21,6 +21,7 @@
 //! | `any` | [`Mt`], an MT of any kind; calls are dispatched by `enum_dispatch` |
 //! | `facts` | what is noted of a half-edge MT while it is made, for the encoder |
 //! | `reaches` | what updates and all that depend on them touch |
+//! | `regions` | parts of the volume that every mesh keeps apart, each tetrahedron being of one |
 //! | `convert`, `replay`, `stats`, `update_errors`, `exact`, `margins`, `ranks`, `error` | over all kinds |
 //!
 //! [`EdgeMt`] stores no DAG: parents and children follow from labels. In [`VertexMt`] and [`VertexTreeMt`] they follow from loops [§5]; these store
@@ -46,6 +47,7 @@ mod mesh;
 mod pages;
 mod ranks;
 mod reaches;
+mod regions;
 mod replay;
 mod stats;
 mod update_errors;
@@ -81,6 +83,8 @@ pub use half_edge::store::{BaseMark, ForestChild, HalfEdgeUpdate};
 pub use ids::UpdateId;
 #[doc(hidden)]
 pub use ids::{Applied, VertexId};
+#[doc(hidden)]
+pub use info::AveragedField;
 pub use info::{FieldInfo, MtInfo, MtKind};
 #[doc(hidden)]
 pub use margins::{Excess, Margins};
@@ -95,6 +99,9 @@ pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
 pub(crate) use pages::updates_of_page;
 pub(crate) use reaches::{Extent, Reaches};
+#[doc(hidden)]
+pub use regions::{MAX_REGIONS, numbers_of};
+pub use regions::{RegionInfo, Regions};
 pub(crate) use replay::apply_next;
 #[doc(hidden)]
 pub use replay::{ReplayError, canonical};

@@ -6,12 +6,13 @@ use super::info::MtInfo;
 use super::mesh::base::{BaseMesh, BaseMeshError};
 use super::mesh::current::CurrentMesh;
 use super::pages::updates_of_page;
+use super::regions::Regions;
 use enum_dispatch::enum_dispatch;
 use std::ops::Range;
 
 /// Sees a tetrahedron: positions at its corners and, by field, levels there, on the lattices; and its
-/// [quarterings](ApplyUpdates::quarterings). Return true to stop.
-pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4], u8) -> bool;
+/// [quarterings](ApplyUpdates::quarterings) and region, 0 without any. Return true to stop.
+pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4], u8, u16) -> bool;
 
 /// A Multi-Tessellation of any kind, to be read: what is known of it as a whole, and of each of its updates [§2].
 #[enum_dispatch]
@@ -21,6 +22,11 @@ pub trait MultiTessellation {
 
     /// The base mesh.
     fn base(&self) -> &BaseMesh;
+
+    /// The regions of the volume, which all meshes keep apart; none if it is not parted. Only half-edge MTs have them.
+    fn regions(&self) -> Option<&Regions> {
+        None
+    }
 
     /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children. Where updates come
     /// in pages, some of these may not be here: see [`UpdatePages::has`].

@@ -148,7 +148,8 @@ impl Front {
             };
             let corners = tet.map(|v| self.mesh.positions[v as usize]);
             let errors = TetErrors::of(task.mt, &self.mesh, t, update);
-            fetched.push(Open { t, tet, update, errors, corners });
+            let region = self.mesh.region(t);
+            fetched.push(Open { t, tet, update, errors, corners, region });
         }
         task.outcome.judged += fetched.len() as u64;
     }

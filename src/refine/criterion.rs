@@ -17,6 +17,8 @@ pub struct TetData<'a> {
     pub errors: &'a [ErrorCode],
     /// The update that removes it.
     pub update: UpdateId,
+    /// Its region, as an index into [`Regions::all`](crate::mt::Regions::all); 0 if the MT has none.
+    pub region: u16,
 }
 
 impl TetData<'_> {
@@ -38,6 +40,8 @@ pub struct BlockData<'a> {
     pub errors: &'a [ErrorCode],
     /// The first update of the block.
     pub first: UpdateId,
+    /// The regions of these tetrahedra, ascending; empty if the MT has none.
+    pub regions: &'a [u16],
 }
 
 impl BlockData<'_> {

@@ -90,7 +90,7 @@ mod tests {
         let margin = |update: u32| {
             let levels = |_: usize| [0; 4];
             let (corners, error, update) = (&[[0; 3]; 4], ErrorCode::ZERO, UpdateId(update));
-            frame.margin(&TetData { corners, levels: &levels, error, errors: &[], update })
+            frame.margin(&TetData { corners, levels: &levels, error, errors: &[], update, region: 0 })
         };
         for update in 1..updates {
             assert!(margin(update - 1) - margin(update) > ROUNDING * frame.reach, "{update}");

@@ -8,6 +8,7 @@ use super::frame::Frame;
 use super::palette::Palette;
 use super::request::{Need, Part, Request, Values};
 use super::shape::Shape;
+use crate::mesh::BitSet;
 use crate::mt::{ErrorCode, MtInfo};
 use glam::DVec3;
 use std::any::Any;
@@ -28,6 +29,8 @@ pub struct LodCriterion {
 struct Atom {
     /// The field whose error counts, if it is not the largest one of all.
     field: Option<usize>,
+    /// The regions in which it counts; all if there is no set.
+    regions: Option<Arc<BitSet>>,
     measure: Measure,
 }
 
@@ -74,7 +77,14 @@ impl LodCriterion {
     /// criterion.
     pub fn new(info: &MtInfo, request: &Request) -> Self {
         let frame = Frame::new(info);
-        let monotone = !request.needs.iter().any(|need| matches!(need.part, Part::Both(..)));
+        // Where something is asked for in some regions alone, one of the tetrahedra that an update removes may be in the region, and another
+        // one where the part is. Of the whole of a region, what creates a tetrahedron removes one of the same region.
+        let is_monotone = |need: &Need| match need.part {
+            Part::Both(..) => false,
+            Part::Everywhere => true,
+            _ => need.regions.is_none(),
+        };
+        let monotone = request.needs.iter().all(is_monotone);
         let atoms = request.needs.iter().flat_map(|need| atoms(info, &frame, need)).collect();
         Self { frame, atoms, custom: Vec::new(), monotone }
     }
@@ -105,7 +115,11 @@ fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
     let tolerance = ErrorCode::at_most(need.error);
     // A single field's error is the largest.
     let error_of = |field: Option<usize>| field.filter(|_| info.fields.len() > 1);
-    let atom = |measure: Measure| Atom { field: error_of(need.measured_field()), measure };
+    let regions = need.regions.as_ref();
+    let regions: Option<Arc<BitSet>> =
+        regions.map(|regions| Arc::new(regions.iter().map(|&region| region.into()).collect()));
+    let atom =
+        |measure: Measure| Atom { field: error_of(need.measured_field()), regions: regions.clone(), measure };
     let field = |shape: Option<Shape>, values| atom(Measure::Field(FieldAtom { tolerance, shape, values }));
     let ranges = |values: &Values| {
         let field = values.field.min(info.fields.len() - 1);
@@ -171,9 +185,11 @@ impl Criterion for LodCriterion {
                 error,
                 errors: block.errors,
                 update: block.first,
+                region: 0,
             };
             let placed = self.frame.place(&corners);
-            self.atoms.iter().any(|atom| atom.judge(&self.frame, &tet, &placed, false).violates())
+            let mut atoms = self.atoms.iter().filter(|atom| atom.meets(block.regions));
+            atoms.any(|atom| atom.measure_of(&self.frame, &tet, &placed, false).violates())
         };
         let mut is_needed = block.tets().into_iter().any(asks);
         for custom in &self.custom {
@@ -188,7 +204,9 @@ impl Criterion for LodCriterion {
 
     fn uniform(&self) -> Option<Vec<Tolerance>> {
         let everywhere = |atom: &Atom| match atom.measure {
-            Measure::Field(FieldAtom { tolerance: error, shape: None, values: None }) => {
+            Measure::Field(FieldAtom { tolerance: error, shape: None, values: None })
+                if atom.regions.is_none() =>
+            {
                 Some(Tolerance { field: atom.field, error })
             }
             _ => None,
@@ -249,9 +267,23 @@ impl Criterion for LodCriterion {
 }
 
 impl Atom {
+    fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
+        // Whoever asks for other regions is infinitely far away.
+        match &self.regions {
+            Some(regions) if !regions.has(u32::from(tet.region)) => Verdict::NEVER,
+            _ => self.measure_of(frame, tet, corners, ranked),
+        }
+    }
+
+    /// Whether it counts in one of these regions of a block; none are known of an MT without regions.
+    fn meets(&self, of_block: &[u16]) -> bool {
+        self.regions.as_ref().is_none_or(|regions| of_block.iter().any(|&r| regions.has(u32::from(r))))
+    }
+
+    /// What it says of a tetrahedron in one of its regions.
     // Not inlined: it is large.
     #[inline(never)]
-    fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
+    fn measure_of(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
         let narrowed;
         let tet = if self.field.is_none() {
             tet
@@ -276,7 +308,7 @@ impl Atom {
 
     /// One component of the distance; not [`ANY`].
     fn component_distance(&self, before: &Self, frame: &Frame, component: u8) -> f64 {
-        if self.field != before.field {
+        if (self.field, &self.regions) != (before.field, &before.regions) {
             return f64::INFINITY;
         }
         match (&self.measure, &before.measure) {
@@ -289,7 +321,7 @@ impl Atom {
     }
 
     fn distance(&self, before: &Self, frame: &Frame) -> f64 {
-        if self.field != before.field {
+        if (self.field, &self.regions) != (before.field, &before.regions) {
             return f64::INFINITY;
         }
         match (&self.measure, &before.measure) {

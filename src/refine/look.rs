@@ -11,12 +11,14 @@ pub(super) struct Open<'a> {
     pub update: UpdateId,
     pub errors: TetErrors<'a>,
     pub corners: [[i32; 3]; 4],
+    pub region: u16,
 }
 
 impl Open<'_> {
     pub fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetData<'a> {
-        let Self { corners, errors, update, .. } = self;
-        TetData { corners, levels, error: errors.largest, errors: &errors.by_field, update: *update }
+        let Self { corners, errors, update, region, .. } = self;
+        let (error, errors) = (errors.largest, &errors.by_field);
+        TetData { corners, levels, error, errors, update: *update, region: *region }
     }
 }
 
@@ -51,11 +53,11 @@ impl<'a> TetErrors<'a> {
     }
 }
 
-/// Calls `judge` with a tetrahedron of the mesh.
+/// Calls `judge` with a tetrahedron of the mesh, by its slot and its vertices.
 #[inline]
 pub(super) fn see(
     mesh: &CurrentMesh,
-    tet: &[u32; 4],
+    (t, tet): (u32, &[u32; 4]),
     errors: &TetErrors<'_>,
     update: UpdateId,
     judge: impl FnOnce(&TetData<'_>) -> Verdict,
@@ -63,5 +65,6 @@ pub(super) fn see(
     let corners = tet.map(|v| mesh.positions[v as usize]);
     let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
     let TetErrors { largest: error, ref by_field } = *errors;
-    judge(&TetData { corners: &corners, levels: &levels, error, errors: by_field, update })
+    let (corners, levels, region) = (&corners, &levels, mesh.region(t));
+    judge(&TetData { corners, levels, error, errors: by_field, update, region })
 }

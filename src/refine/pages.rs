@@ -46,7 +46,6 @@ impl Front {
         let (updates, known) = (mt.page_updates(page), self.known);
         self.sync(mt);
         if updates.start < known {
-            self.mesh.forget_proven(updates.start);
             self.add_updates(mt, updates);
         }
     }
@@ -98,7 +97,7 @@ impl Front {
             let errors = known.or_else(|| mt.awaited_errors(&self.mesh, t).map(TetErrors::bounded_by));
             let Some(errors) = errors else { return };
             let verdict =
-                see(&self.mesh, &tet, &errors, update.unwrap_or(absent), |look| criterion.rank(look));
+                see(&self.mesh, (t, &tet), &errors, update.unwrap_or(absent), |look| criterion.rank(look));
             if verdict.violates() {
                 demands.push(u128::from(page_of(absent)) << 64 | u128::from(verdict.excess.to_bits()));
             }
@@ -120,7 +119,7 @@ impl Front {
         let removed = tets.filter_map(|(t, tet)| Some((t, tet, mt.remover(&self.mesh, t)?)));
         let excesses = removed.map(|(t, tet, u)| {
             let errors = TetErrors::of(mt, &self.mesh, t, u);
-            see(&self.mesh, tet, &errors, u, |look| criterion.rank(look)).excess
+            see(&self.mesh, (t, tet), &errors, u, |look| criterion.rank(look)).excess
         });
         excesses.fold(1.0, f64::max)
     }
@@ -144,7 +143,7 @@ impl Front {
             }
             let bounds = bounds(page);
             let errors = TetErrors::bounded_by(&bounds);
-            if see(&self.mesh, tet, &errors, u, |look| criterion.judge(look)).violates() {
+            if see(&self.mesh, (t, tet), &errors, u, |look| criterion.judge(look)).violates() {
                 pages.push(page);
             }
         }

@@ -72,7 +72,7 @@ impl Front {
             let missing = incomplete && (update.is_none() || unlimited);
             // The last number: regions are not widened.
             let update = update.unwrap_or(UpdateId(mt.info().updates));
-            let verdict = see(&self.mesh, tet, &errors, update, |look| criterion.rank(look));
+            let verdict = see(&self.mesh, (t, tet), &errors, update, |look| criterion.rank(look));
             if verdict.violates() {
                 let TetErrors { largest, by_field } = &errors;
                 let error = field.and_then(|field| by_field.get(field)).copied().unwrap_or(*largest);
@@ -141,7 +141,7 @@ impl Front {
                 return false;
             }
             let update = update.unwrap_or(UpdateId(mt.info().updates));
-            see(&self.mesh, tet, &errors, update, |look| goal.criterion.judge(look)).violates()
+            see(&self.mesh, (t, tet), &errors, update, |look| goal.criterion.judge(look)).violates()
         };
         (0..).zip(tets).map(is_missing).collect()
     }

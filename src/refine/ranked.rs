@@ -107,7 +107,7 @@ impl Front {
         let Some(u) = task.mt.remover(&self.mesh, t) else { return };
         task.outcome.judged += 1;
         let errors = TetErrors::of(task.mt, &self.mesh, t, u);
-        let verdict = see(&self.mesh, &tet, &errors, u, |look| task.criterion.rank(look));
+        let verdict = see(&self.mesh, (t, &tet), &errors, u, |look| task.criterion.rank(look));
         if verdict.violates() {
             self.ranked.refinable.push((rank(verdict.excess, u), t));
         }

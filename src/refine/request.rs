@@ -35,6 +35,9 @@ pub struct Need {
     pub field: Option<usize>,
     /// Where the error counts, and how it is measured.
     pub part: Part,
+    /// The regions of the MT ([`Regions`](crate::mt::Regions)) in which it counts, as indices into its list; all if there is no list. Others
+    /// stay as coarse as the rest of the mesh lets them.
+    pub regions: Option<Vec<u16>>,
 }
 
 /// Where a need counts, and how it measures the error.
@@ -227,23 +230,30 @@ impl From<Need> for Request {
 impl Need {
     /// The field within `error` of the reference, as a fraction of its range, everywhere.
     pub fn within(error: f64) -> Self {
-        Self { error, field: None, part: Part::Everywhere }
+        Self { error, field: None, part: Part::Everywhere, regions: None }
     }
 
     /// What a camera sees, within so many pixels.
     pub fn seen(view: View, pixels: f64) -> Self {
-        Self { error: pixels, field: None, part: Part::View(view) }
+        Self { part: Part::View(view), ..Self::within(pixels) }
     }
 
     /// What a transfer function shows, within so much of colour and opacity.
     pub fn shown(transfer: Transfer, error: f64) -> Self {
-        Self { error, field: None, part: Part::Transfer(transfer) }
+        Self { part: Part::Transfer(transfer), ..Self::within(error) }
     }
 
     /// Only the error of field number `field` counts.
     #[must_use]
     pub fn of_field(mut self, field: usize) -> Self {
         self.field = Some(field);
+        self
+    }
+
+    /// Only in these regions of the MT.
+    #[must_use]
+    pub fn in_regions(mut self, regions: Vec<u16>) -> Self {
+        self.regions = Some(regions);
         self
     }
 
@@ -304,6 +314,14 @@ pub enum RequestError {
         /// How many fields there are.
         fields: usize,
     },
+    /// The MT has no region of this number.
+    #[error("there is no region number {index}; the MT has {regions}, counted from 0")]
+    Region {
+        /// The number in the request.
+        index: u16,
+        /// How many regions there are.
+        regions: usize,
+    },
     /// A need contains an invalid number.
     #[error("need number {need}: {problem}")]
     Need {
@@ -333,6 +351,20 @@ impl Request {
             need.check().map_err(|problem| RequestError::Need { need: i, problem })?;
         }
         Ok(())
+    }
+}
+
+impl Request {
+    /// Checks the regions of a request for an MT with so many.
+    ///
+    /// # Errors
+    /// The first that there is not.
+    pub fn check_regions(&self, regions: usize) -> Result<(), RequestError> {
+        let mut all = self.needs.iter().flat_map(|need| need.regions.iter().flatten());
+        match all.find(|&&index| usize::from(index) >= regions) {
+            Some(&index) => Err(RequestError::Region { index, regions }),
+            None => Ok(()),
+        }
     }
 }
 

@@ -30,10 +30,10 @@ impl Front {
             if own == 0 || task.mt.has_tet_errors() { Some(TetErrors::new(task.mt, u, own)) } else { None }
         });
         let mut all = Verdict::NEVER;
-        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], own: u8| {
+        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], own: u8, region: u16| {
             let of_own = all_errors.get(usize::from(own)).and_then(Option::as_ref).or(all_errors[0].as_ref());
             let Some(TetErrors { largest, by_field }) = of_own else { return false };
-            let look = TetData { corners, levels, error: *largest, errors: by_field, update: u };
+            let look = TetData { corners, levels, error: *largest, errors: by_field, update: u, region };
             let one = if ranked { task.criterion.rank(&look) } else { task.criterion.judge(&look) };
             all = all.or(one);
             !ranked && one.violates() && one.slack > LONG

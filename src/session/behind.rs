@@ -37,7 +37,7 @@ impl Behind {
 }
 
 /// Adds the ranges `more` to `ranges`; both are in ascending order, and so is what comes out.
-fn join(ranges: &mut Vec<Range<u32>>, more: &[Range<u32>]) {
+pub(super) fn join(ranges: &mut Vec<Range<u32>>, more: &[Range<u32>]) {
     let mut old = std::mem::take(ranges).into_iter().peekable();
     let mut new = more.iter().cloned().peekable();
     loop {

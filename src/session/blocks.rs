@@ -377,7 +377,9 @@ impl Session {
         });
         blocks.left_out = blocks.needed - plan.len() as u32;
         blocks.plan = plan;
-        let is_planned = |block: u32| blocks.plan.iter().any(|&(_, planned)| planned == block);
+        let mut planned = vec![false; index.blocks.len()];
+        blocks.plan.iter().for_each(|&(_, block)| planned[block as usize] = true);
+        let is_planned = |block: u32| planned[block as usize];
         blocks.waiting.retain(|&block, _| is_planned(block));
         let decoder = &self.decoder;
         blocks.pieces.retain(|&start, _| decoder.block_at(start).is_some_and(is_planned));
@@ -484,10 +486,16 @@ fn reached(
     let mut needed = Vec::new();
     for block in 0..index.blocks.len() as u32 {
         let errors = errors_of(index, fields, block);
-        let BlockInfo { bounds, ranges, .. } = &index.blocks[block as usize];
+        let BlockInfo { bounds, ranges, regions, .. } = &index.blocks[block as usize];
         let ranges: Vec<[i32; 2]> = fields.iter().map(|&f| ranges[f]).collect();
         let first = UpdateId(index.updates(block, info.updates).start);
-        if criterion.may_need(&BlockData { bounds: *bounds, ranges: &ranges, errors: &errors, first })? {
+        if criterion.may_need(&BlockData {
+            bounds: *bounds,
+            ranges: &ranges,
+            errors: &errors,
+            first,
+            regions,
+        })? {
             needed.push((errors.into_iter().max().unwrap_or(ErrorCode::ZERO), block));
         }
     }

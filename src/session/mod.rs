@@ -24,14 +24,18 @@ mod behind;
 mod block_state;
 mod blocks;
 mod client;
+mod deformation;
 mod depths;
 mod first_picture;
 mod quantity;
 mod reading;
+mod shown_tets;
 
 #[doc(hidden)]
 pub use blocks::{BlockProgress, BlockState, MappedBlock};
 pub use client::{Client, ClientError};
+#[doc(hidden)]
+pub use deformation::{Deformation, UnknownVector};
 #[doc(hidden)]
 pub use quantity::TetQuantity;
 #[doc(hidden)]
@@ -39,7 +43,7 @@ pub use reading::Reading;
 
 use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError};
 use crate::geom::Bounds;
-use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTessellation};
+use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTessellation, Regions};
 use crate::refine::{
     Criterion, Front, LodCriterion, Need, Outcome, Part, RefineStats, Request, RequestError,
 };
@@ -47,6 +51,7 @@ use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges
 use behind::Behind;
 use block_state::Blocks;
 use depths::Depths;
+use shown_tets::ShownTets;
 use std::ops::Range;
 use std::sync::Arc;
 use thiserror::Error;
@@ -110,6 +115,7 @@ struct Shown {
     values: Vec<f64>,
     /// Another field is to be shown: all values are to be set.
     stale: bool,
+    tets: ShownTets,
 }
 
 impl Session {
@@ -227,6 +233,7 @@ impl Session {
             return Err(SessionError::NotReady);
         };
         request.check(mt.info())?;
+        request.check_regions(mt.regions().map_or(0, |regions| regions.all.len()))?;
         let own = LodCriterion::new(mt.info(), request);
         let criterion = custom.iter().fold(own, |all, one| all.and(Arc::clone(one)));
         let criterion: Arc<dyn Criterion> = Arc::new(criterion);
@@ -285,7 +292,37 @@ impl Session {
         Ok(())
     }
 
-    /// The current mesh in model units; empty until the base mesh is there.
+    /// Chooses the regions that [`Session::view`], isosurfaces and sections show; all if there is no list. A region that the MT does not have
+    /// is none. What a request needs is its own matter: see [`Need::in_regions`].
+    pub fn show_regions(&mut self, regions: Option<&[u16]>) {
+        self.shown.tets.choose_regions(regions);
+    }
+
+    /// Chooses a field, by its number, and a range in its units: of the tetrahedra, those are shown whose four vertices have a value within it,
+    /// ends included. All if there is none, or no such field. What a request needs is its own matter, as with
+    /// [`Session::show_regions`].
+    pub fn show_within(&mut self, within: Option<(usize, [f64; 2])>) {
+        self.shown.tets.choose_within(within);
+    }
+
+    /// The regions of the volume; none if it is not parted, or the base mesh is not there.
+    pub fn regions(&self) -> Option<&Regions> {
+        self.mt()?.regions()
+    }
+
+    /// The largest error that the mesh has in a field anywhere, whatever was asked for, as a fraction of the field's range; at vertices of the
+    /// reference mesh, as [`MtInfo::field_bound`] and [`MtInfo::boundary_bound`] take it. None until the base mesh is there.
+    ///
+    /// # Panics
+    /// If there is no such field.
+    pub fn error_in(&self, field: usize) -> Option<f64> {
+        let (front, mt) = (self.front.as_ref()?, self.decoder.mt()?);
+        Some(front.largest_left(mt, Some(field), ErrorCode::MAX).error())
+    }
+
+    /// The current mesh in model units; empty until the base mesh is there. Tetrahedra that are not shown
+    /// ([`Session::show_regions`], [`Session::show_within`]) have no vertices there, but [`NONE`](crate::mesh::NONE) in their places, and are
+    /// no neighbours.
     pub fn view(&mut self) -> MeshView<'_> {
         self.catch_up();
         view(self.front.as_ref(), &self.shown)
@@ -448,7 +485,7 @@ impl Session {
 
     /// Bytes that the current mesh takes with its adjacency, its form in model units, and the queues of refinement.
     pub fn mesh_bytes(&self) -> u64 {
-        let shown = 24 * self.shown.positions.len() + 8 * self.shown.values.len();
+        let shown = 24 * self.shown.positions.len() + 8 * self.shown.values.len() + self.shown.tets.bytes();
         self.front.as_ref().map_or(0, |front| front.mesh().bytes() + front.queue_bytes()) + shown as u64
     }
 
@@ -460,7 +497,8 @@ impl Session {
     /// Brings `shown` up to date.
     fn catch_up(&mut self) {
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else { return };
-        let changes = front.mesh_mut().take_changes();
+        let mut changes = front.mesh_mut().take_changes();
+        self.shown.tets.update(front.mesh(), &mt.info().fields, &mut changes.tets);
         let (mesh, shown) = (front.mesh(), &mut self.shown);
         let (lattice, field) = (&mt.info().lattice, &mt.info().fields[self.field]);
         let slots = mesh.positions().len();
@@ -481,7 +519,8 @@ impl Session {
 }
 
 fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
-    let (tets, neighbors) = front.map_or((&[][..], &[][..]), |f| (f.mesh().tets(), f.mesh().neighbors()));
+    let all = front.map_or([&[][..]; 2], |front| [front.mesh().tets(), front.mesh().neighbors()]);
+    let [tets, neighbors] = shown.tets.tets().unwrap_or(all);
     MeshView { positions: &shown.positions, field: &shown.values, tets, neighbors }
 }
 

@@ -25,13 +25,16 @@ pub enum TetQuantity {
     /// 1 where a finer mesh was asked for and the data has not arrived, else 0: see
     /// [`Front::missing_tets`](crate::refine::Front::missing_tets).
     Missing,
+    /// The number of its region in [`Session::regions`], counted from 0; 0 without regions.
+    Region,
 }
 
 impl TetQuantity {
     /// All quantities.
-    pub const ALL: [Self; 5] = [Self::Size, Self::Error, Self::Depth, Self::Block, Self::Missing];
+    pub const ALL: [Self; 6] =
+        [Self::Size, Self::Error, Self::Depth, Self::Block, Self::Missing, Self::Region];
 
-    /// The quantity in one word: `size`, `error`, `depth`, `block` or `missing`.
+    /// The quantity in one word: `size`, `error`, `depth`, `block`, `missing` or `region`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Size => "size",
@@ -39,6 +42,7 @@ impl TetQuantity {
             Self::Depth => "depth",
             Self::Block => "block",
             Self::Missing => "missing",
+            Self::Region => "region",
         }
     }
 
@@ -101,6 +105,10 @@ impl Session {
             TetQuantity::Missing => {
                 values.extend(front.missing_tets(mt).iter().map(|&missing| f64::from(u8::from(missing))));
             }
+            TetQuantity::Region if front.mesh().regions().is_empty() => {
+                values.resize(front.mesh().tets().len(), 0.0);
+            }
+            TetQuantity::Region => values.extend(front.mesh().regions().iter().map(|&r| f64::from(r))),
             TetQuantity::Block => {
                 let bits = self.decoder.index().map_or(mt.page_bits(), |index| index.block_bits);
                 values.extend(blocks(mt, front, bits));

@@ -14,6 +14,8 @@ pub struct Reading {
     pub values: Vec<f64>,
     /// The tetrahedron that holds the point: an index into `tets` of [`Session::view`].
     pub tet: u32,
+    /// The number of its region, in [`Session::regions`]; none without regions.
+    pub region: Option<u16>,
     /// The size of the tetrahedron, as [`TetQuantity::Size`](super::TetQuantity::Size).
     pub size: f64,
     /// The error of the tetrahedron, as [`TetQuantity::Error`](super::TetQuantity::Error): a fraction of the field's range.
@@ -43,6 +45,7 @@ impl Session {
             position: point,
             values: (0..info.fields.len()).map(value).collect(),
             tet: place.tet,
+            region: mesh.regions().get(place.tet as usize).copied(),
             size: size(&info.lattice, mesh, tet),
             error: front.tet_error(mt, place.tet).error(),
         }))

@@ -33,10 +33,19 @@ impl BoundarySurface {
     /// # Panics
     /// If the mesh names a point that it does not have.
     pub fn extract(&mut self, mesh: &MeshView<'_>) {
+        self.extract_of(mesh, |_| true);
+    }
+
+    /// [`Self::extract`] of the faces of some tetrahedra alone.
+    ///
+    /// # Panics
+    /// If the mesh names a point that it does not have.
+    pub fn extract_of(&mut self, mesh: &MeshView<'_>, is_wanted: impl Fn(u32) -> bool) {
         self.indices.clear();
         self.points.clear();
         self.vertex_of.resize(mesh.positions.len(), NONE);
-        for (_, face) in boundary_faces(mesh.tets, mesh.neighbors) {
+        let faces = boundary_faces(mesh.tets, mesh.neighbors).filter(|(tet, _)| is_wanted(*tet));
+        for (_, face) in faces {
             let triangle = face.map(|point| self.vertex(point));
             self.indices.push(triangle);
         }

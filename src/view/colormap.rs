@@ -90,7 +90,7 @@ impl Colormap {
         GREY, COOLWARM, VIK, ROMA, BALANCE,
     ];
 
-    const fn plain(name: &'static str, controls: &'static [[u8; 3]]) -> Self {
+    pub(super) const fn plain(name: &'static str, controls: &'static [[u8; 3]]) -> Self {
         Self { name, controls, is_diverging: false }
     }
 

@@ -1,5 +1,6 @@
 //! Which colour a value of a field has.
 
+use super::ticks::ticks_at;
 use crate::view::{Colormap, Histogram, Tick, end_ticks, linear_ticks, log_ticks};
 use thiserror::Error;
 
@@ -24,6 +25,9 @@ pub struct ColourScale {
     pub is_reversed: bool,
     /// Whether colours are even in the logarithm of the value; the range must be positive.
     pub is_log: bool,
+    /// How many colours there are, in equal parts of the range from the first to the last of the map; with fewer than 2 they run into
+    /// one another.
+    pub bands: u8,
 }
 
 /// Why a [`ColourScale`] has no colours.
@@ -53,7 +57,7 @@ impl ColourScale {
     /// # Errors
     /// As [`ColourScale::validate`].
     pub fn new(map: Colormap, range: [f64; 2]) -> Result<Self, ScaleError> {
-        Self { map, range, is_reversed: false, is_log: false }.validate()
+        Self { map, range, is_reversed: false, is_log: false, bands: 0 }.validate()
     }
 
     /// The scale itself, if its range is finite and ascending, or of one value, and positive if it is
@@ -100,22 +104,35 @@ impl ColourScale {
 
     /// The colour of a value, as sRGB components from 0 to 1.
     pub fn colour(&self, value: f64) -> [f32; 3] {
-        let fraction = self.fraction(value) as f32;
-        self.map.at(if self.is_reversed { 1.0 - fraction } else { fraction })
+        self.colour_at(self.fraction(value))
+    }
+
+    /// The colour at a fraction of the range, as sRGB components from 0 to 1.
+    pub fn colour_at(&self, fraction: f64) -> [f32; 3] {
+        let banded = match f64::from(self.bands) {
+            bands if bands >= 2.0 => (fraction * bands).floor().clamp(0.0, bands - 1.0) / (bands - 1.0),
+            _ => fraction,
+        } as f32;
+        self.map.at(if self.is_reversed { 1.0 - banded } else { banded })
     }
 
     /// The colours at `N` evenly spaced fractions from 0 to 1, as `RGBA` bytes.
     pub fn table<const N: usize>(&self) -> [[u8; 4]; N] {
-        let mut table = self.map.table();
-        if self.is_reversed {
-            table.reverse();
-        }
-        table
+        std::array::from_fn(|i| {
+            let [r, g, b] =
+                self.colour_at(i as f64 / (N.max(2) - 1) as f64).map(|c| (c * 255.0).round() as u8);
+            [r, g, b, 255]
+        })
     }
 
     /// At most `count` ticks for a bar with these colours, ascending: the ends of the range, and round numbers with room between
-    /// them. A tick belongs at the [`fraction`](ColourScale::fraction) of its value.
+    /// them; where bands meet, if these are no more. A tick belongs at the [`fraction`](ColourScale::fraction) of its value.
     pub fn ticks(&self, count: usize) -> Vec<Tick> {
+        let bands = usize::from(self.bands);
+        if (2..count).contains(&bands) {
+            let edges: Vec<f64> = (0..=bands).map(|i| self.value(i as f64 / bands as f64)).collect();
+            return ticks_at(&edges, self.is_log);
+        }
         let round =
             |count| if self.is_log { log_ticks(self.range, count) } else { linear_ticks(self.range, count) };
         let Some([low, high]) = end_ticks(self.range, self.is_log).filter(|_| count > 1) else {
@@ -172,7 +189,7 @@ mod tests {
     use crate::view::{COOLWARM, GREY, VIRIDIS};
 
     const LOG: ColourScale =
-        ColourScale { map: VIRIDIS, range: [0.01, 100.0], is_reversed: false, is_log: true };
+        ColourScale { map: VIRIDIS, range: [0.01, 100.0], is_reversed: false, is_log: true, bands: 0 };
 
     #[test]
     fn ticks_begin_and_end_with_the_range() {
@@ -188,6 +205,21 @@ mod tests {
             labels(ColourScale::new(VIRIDIS, [1.7e9, 1.7e9 + 3.0]).unwrap(), 6).first().unwrap(),
             "1700000000"
         );
+    }
+
+    #[test]
+    fn bands_have_one_colour_each_and_ticks_where_they_meet() {
+        let scale = ColourScale { bands: 4, ..ColourScale::new(GREY, [0.0, 10.0]).unwrap() };
+        let shades = [-1.0, 0.0, 2.4, 2.5, 4.9, 5.0, 7.5, 10.0, 11.0].map(|value| scale.colour(value)[0]);
+        let wanted = [0, 0, 0, 1, 1, 2, 3, 3, 3].map(|band| GREY.at(band as f32 / 3.0)[0]);
+        assert_eq!(shades, wanted);
+        let labels =
+            |scale: ColourScale| scale.ticks(6).into_iter().map(|tick| tick.label).collect::<Vec<_>>();
+        assert_eq!(labels(scale), ["0.0", "2.5", "5.0", "7.5", "10.0"]);
+        assert_eq!(labels(ColourScale { bands: 4, ..LOG }), ["0.01", "0.1", "1", "10", "100"]);
+        // Too many to be labelled.
+        assert_eq!(labels(ColourScale { bands: 20, ..scale }), labels(ColourScale { bands: 0, ..scale }));
+        assert_eq!(ColourScale { bands: 1, ..scale }.table::<9>(), GREY.table::<9>());
     }
 
     #[test]

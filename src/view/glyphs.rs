@@ -49,7 +49,8 @@ struct Arrow {
     middle: DVec3,
     vector: DVec3,
     magnitude: f64,
-    value: f64,
+    /// Its value, and where in the mesh its middle is.
+    of: (f64, Place),
 }
 
 impl Solids {
@@ -96,23 +97,23 @@ impl Solids {
         if length <= 0.0 || !self.has_room_for(6 * MOST_SIDES as usize) {
             return false;
         }
-        let Arrow { middle, vector, magnitude, value } = *arrow;
+        let Arrow { middle, vector, magnitude, of } = *arrow;
         let frame = Frame::around(vector / magnitude);
         let (tail, back) = (middle - frame.along * (0.5 * length), -frame.along);
         let at = |p: [f64; 2], along: f64, radius: f64| {
             tail + (frame.along * along + frame.towards(p) * radius) * length
         };
-        let end = self.ring(value, |p| (at(p, 0.0, SHAFT), back));
+        let end = self.ring(of, |p| (at(p, 0.0, SHAFT), back));
         self.disk(end, false);
-        let [low, high] = [0.0, NECK].map(|x| self.ring(value, |p| (at(p, x, SHAFT), frame.towards(p))));
+        let [low, high] = [0.0, NECK].map(|x| self.ring(of, |p| (at(p, x, SHAFT), frame.towards(p))));
         self.band(low, high);
-        let [inner, outer] = [SHAFT, HEAD].map(|r| self.ring(value, |p| (at(p, NECK, r), back)));
+        let [inner, outer] = [SHAFT, HEAD].map(|r| self.ring(of, |p| (at(p, NECK, r), back)));
         self.band(inner, outer);
         // Perpendicular to the side of the cone.
         let slope = DVec3::new(1.0 - NECK, HEAD, 0.0).normalize_or_zero();
         let normal = |p: [f64; 2]| frame.towards(p) * slope.x + frame.along * slope.y;
         let [rim, tips] =
-            [(NECK, HEAD), (1.0, 0.0)].map(|(x, r)| self.ring(value, |p| (at(p, x, r), normal(p))));
+            [(NECK, HEAD), (1.0, 0.0)].map(|(x, r)| self.ring(of, |p| (at(p, x, r), normal(p))));
         self.tips(rim, tips);
         true
     }
@@ -151,5 +152,10 @@ fn arrow(
     let vector = DVec3::from(vectors.map(|component| place.interpolate(mesh, component)));
     let magnitude = vector.length();
     let value = field.map_or(magnitude, |field| place.interpolate(mesh, field));
-    (magnitude > 0.0 && magnitude.is_finite()).then(|| Arrow { middle: p.into(), vector, magnitude, value })
+    (magnitude > 0.0 && magnitude.is_finite()).then(|| Arrow {
+        middle: p.into(),
+        vector,
+        magnitude,
+        of: (value, place),
+    })
 }

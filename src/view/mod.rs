@@ -14,8 +14,10 @@ mod glyphs;
 mod iso;
 mod marching;
 mod mesh_snapshot;
+mod moves;
 mod pick;
 mod probe;
+mod region_palette;
 mod slice;
 mod solids;
 mod stats;
@@ -49,10 +51,14 @@ pub use glyphs::ArrowLength;
 pub use glyphs::ArrowOptions;
 pub use iso::{IsoSurface, NormalKind};
 #[doc(hidden)]
-pub use pick::{MediumHit, SurfaceHit, first_hit, first_hit_in};
+pub use moves::Slope;
+#[doc(hidden)]
+pub use pick::{MediumHit, SurfaceHit, first_hit, first_hit_in, first_hit_in_displaced, first_kept_hit};
 pub use probe::Probe;
 #[doc(hidden)]
 pub use probe::{Place, Span};
+#[doc(hidden)]
+pub use region_palette::{region_color, region_scale};
 pub use slice::{Plane, Slice};
 #[doc(hidden)]
 pub use solids::Solids;

@@ -7,6 +7,7 @@
 
 use crate::geom::Ray;
 use crate::view::{ClipPlane, Medium, MeshView, Place, Probe, Span, Triangles};
+use glam::DVec3;
 
 /// Halvings of the interval in which half of the light is lost: to the last bits of a number.
 const HALVINGS: u32 = 52;
@@ -20,6 +21,8 @@ pub struct SurfaceHit {
     pub position: [f64; 3],
     /// The triangle.
     pub triangle: u32,
+    /// The weights of its corners.
+    pub weights: [f64; 3],
     /// What is linear between the values of its corners; NaN if one has none.
     pub value: f64,
 }
@@ -60,18 +63,16 @@ pub struct MediumHit {
 /// ```
 pub fn first_hit(surface: &Triangles<'_>, ray: &Ray, planes: &[ClipPlane]) -> Option<SurfaceHit> {
     let way = Way::new(ray)?;
-    let [near, far] = way.kept(planes)?;
-    // With the axis as a constant, a triangle takes half the time.
-    let nearest = match way.axis {
-        0 => way.nearest::<0>(surface, [near, far]),
-        1 => way.nearest::<1>(surface, [near, far]),
-        _ => way.nearest::<2>(surface, [near, far]),
-    };
-    let (distance, triangle, weights) = nearest?;
-    let value_at = |v: u32| surface.values.get(v as usize).copied().unwrap_or(f64::NAN);
-    let values = surface.indices.get(triangle as usize)?.map(value_at);
-    let value = (0..3).map(|i| weights[i] * values[i]).sum();
-    Some(SurfaceHit { distance, position: way.at(distance), triangle, value })
+    way.first_hit(surface, way.kept(planes)?, |_, _| true)
+}
+
+/// [`first_hit`] of the parts of a surface that are kept, by the weights of the corners of a triangle.
+pub fn first_kept_hit(
+    surface: &Triangles<'_>,
+    ray: &Ray,
+    keeps: impl Fn(&[u32; 3], [f64; 3]) -> bool,
+) -> Option<SurfaceHit> {
+    Way::new(ray)?.first_hit(surface, [0.0, f64::INFINITY], keeps)
 }
 
 /// The point along a ray where half of the light is lost: the opacity so far is one half. What the planes cut
@@ -88,13 +89,55 @@ pub fn first_hit_in(
     planes: &[ClipPlane],
 ) -> Option<MediumHit> {
     let way = Way::new(ray)?;
+    half_lost(medium, probe, &way, way.kept(planes)?, Some)
+}
+
+/// [`first_hit_in`] for a mesh that is displaced: the planes cut what is not, which has the same tetrahedra.
+///
+/// # Panics
+/// As [`first_hit_in`].
+pub fn first_hit_in_displaced(
+    medium: &Medium,
+    probe: &Probe<'_>,
+    rest: &MeshView<'_>,
+    ray: &Ray,
+    planes: &[ClipPlane],
+) -> Option<MediumHit> {
+    let way = Way::new(ray)?;
+    half_lost(medium, probe, &way, [0.0, f64::INFINITY], |span| {
+        let ends = [span.entry, span.exit].map(|place| DVec3::from(place.position(rest)));
+        let [mut first, mut last] = [0.0_f64, 1.0_f64];
+        for plane in planes {
+            let [from, to] = ends.map(|end| DVec3::from(plane.normal).dot(end) - plane.offset);
+            if from > 0.0 && to > 0.0 {
+                return None;
+            }
+            if from > 0.0 {
+                first = first.max(from / (from - to));
+            } else if to > 0.0 {
+                last = last.min(from / (from - to));
+            }
+        }
+        let at = |part: f64| span.from + part * (span.to - span.from);
+        let (from, to) = (at(first), at(last));
+        (first < last).then(|| Span { from, to, entry: between(&span, first), exit: between(&span, last) })
+    })
+}
+
+/// The point where half of the light is lost that goes through what is kept of each span.
+fn half_lost(
+    medium: &Medium,
+    probe: &Probe<'_>,
+    way: &Way,
+    limits: [f64; 2],
+    kept: impl Fn(Span) -> Option<Span>,
+) -> Option<MediumHit> {
     let mesh = probe.mesh();
-    let [near, far] = way.kept(planes)?;
-    let [near, far] = way.through(mesh, [near, far])?;
+    let [near, far] = way.through(mesh, limits)?;
     let (from, to) = (way.at(near), way.at(far));
     let length = far - near;
     let mut left = 1.0;
-    for span in probe.line(from, to) {
+    for span in probe.line(from, to).into_iter().filter_map(kept) {
         let ends = [span.entry, span.exit].map(|place| place.value(mesh));
         let through = medium.piece(ends, (span.to - span.from) * length).transmittance;
         if left * through > 0.5 {
@@ -199,19 +242,40 @@ impl Way {
         (near < far).then_some([near, far])
     }
 
+    /// The nearest hit between two distances of what is kept.
+    fn first_hit(
+        &self,
+        surface: &Triangles<'_>,
+        limits: [f64; 2],
+        keeps: impl Fn(&[u32; 3], [f64; 3]) -> bool,
+    ) -> Option<SurfaceHit> {
+        // With the axis as a constant, a triangle takes half the time.
+        let nearest = match self.axis {
+            0 => self.nearest::<0>(surface, limits, keeps),
+            1 => self.nearest::<1>(surface, limits, keeps),
+            _ => self.nearest::<2>(surface, limits, keeps),
+        };
+        let (distance, triangle, weights) = nearest?;
+        let value_at = |v: u32| surface.values.get(v as usize).copied().unwrap_or(f64::NAN);
+        let values = surface.indices.get(triangle as usize)?.map(value_at);
+        let value = (0..3).map(|i| weights[i] * values[i]).sum();
+        Some(SurfaceHit { distance, position: self.at(distance), triangle, weights, value })
+    }
+
     /// The nearest cut between two distances, the first of several: its distance, the triangle, and the
     /// weights of the corners.
     fn nearest<const AXIS: usize>(
         &self,
         surface: &Triangles<'_>,
         [near, far]: [f64; 2],
+        keeps: impl Fn(&[u32; 3], [f64; 3]) -> bool,
     ) -> Option<(f64, u32, [f64; 3])> {
         let mut best: Option<(f64, u32, [f64; 3])> = None;
         for (i, triangle) in (0..).zip(surface.indices) {
             let Some(corners) = corners(surface, triangle) else { continue };
             let Some((distance, weights)) = self.cut::<AXIS>(corners) else { continue };
             let limit = best.map_or(f64::INFINITY, |(nearest, ..)| nearest);
-            if near <= distance && distance <= far && distance < limit {
+            if near <= distance && distance <= far && distance < limit && keeps(triangle, weights) {
                 best = Some((distance, i, weights));
             }
         }

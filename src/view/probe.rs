@@ -51,6 +51,15 @@ impl Place {
         self.interpolate(mesh, mesh.field)
     }
 
+    /// Where in the model it is.
+    ///
+    /// # Panics
+    /// If the mesh has no such tetrahedron.
+    pub fn position(&self, mesh: &MeshView<'_>) -> [f64; 3] {
+        let corners = mesh.tets[self.tet as usize].map(|p| mesh.positions[p as usize]);
+        [0, 1, 2].map(|axis| (0..4).map(|i| self.weights[i] * corners[i][axis]).sum())
+    }
+
     /// The value of any field, given by one number a point.
     ///
     /// # Panics

@@ -147,7 +147,8 @@ impl Slice {
         let Self { pieces, indices, sides, .. } = self;
         pieces.follow(indices);
         let mut dirty = snapshot.catch_up(mesh, points, tets).tets;
-        dirty.retain(|t| pieces.has_piece(*t) || may_pass(sides, &mesh.tets[*t as usize]));
+        let is_there = |tet: &[u32; 4]| tet[0] != NONE && may_pass(sides, tet);
+        dirty.retain(|t| pieces.has_piece(*t) || is_there(&mesh.tets[*t as usize]));
         // A face in the plane comes from another tetrahedron when what was across it has changed.
         dirty.extend(entries(tets, mesh.tets.len(), mesh.tets.len()).filter(|&t| {
             let may_have_floor = pieces.has_piece(t) || mesh.neighbors[t as usize].contains(&NONE);

@@ -2,6 +2,7 @@
 //!
 //! Cosines and sines are summed up here, so that the triangles are the same on every platform.
 
+use crate::view::{MeshView, Place};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -20,6 +21,8 @@ pub struct Solids {
     pub values: Vec<f64>,
     /// Triangles, counter-clockwise when seen from outside.
     pub indices: Vec<[u32; 3]>,
+    /// Where in the mesh each vertex belongs to: the place of the line or the arrow that it is of.
+    places: Vec<Place>,
     /// Points of the unit circle: a side of each body begins at each.
     circle: Vec<[f64; 2]>,
 }
@@ -100,6 +103,7 @@ impl Solids {
             normals: Vec::new(),
             values: Vec::new(),
             indices: Vec::new(),
+            places: Vec::new(),
             circle: (0..sides).map(|k| circle_point(k, sides)).collect(),
         }
     }
@@ -110,6 +114,7 @@ impl Solids {
         self.normals.clear();
         self.values.clear();
         self.indices.clear();
+        self.places.clear();
     }
 
     /// How many sides the bodies have.
@@ -122,22 +127,32 @@ impl Solids {
         vertices <= MOST_VERTICES.saturating_sub(self.positions.len())
     }
 
+    /// The value at each vertex of a field of the mesh that the bodies stand in, given by one number a point: that of the line or in the
+    /// middle of the arrow.
+    ///
+    /// # Panics
+    /// If there are fewer numbers than points in that mesh.
+    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> Vec<f64> {
+        self.places.iter().map(|place| place.interpolate(mesh, field)).collect()
+    }
+
     /// Adds a vertex.
-    pub(super) fn vertex(&mut self, position: DVec3, normal: DVec3, value: f64) -> u32 {
+    pub(super) fn vertex(&mut self, position: DVec3, normal: DVec3, (value, place): (f64, Place)) -> u32 {
         let vertex = self.positions.len() as u32;
         self.positions.push(position.to_array());
         self.normals.push(normal.to_array().map(|x| x as f32));
         self.values.push(value);
+        self.places.push(place);
         vertex
     }
 
     /// Adds a ring of vertices: `place` makes position and normal of a point of the unit circle. Gives the
     /// first vertex.
-    pub(super) fn ring(&mut self, value: f64, place: impl Fn([f64; 2]) -> (DVec3, DVec3)) -> u32 {
+    pub(super) fn ring(&mut self, of: (f64, Place), place: impl Fn([f64; 2]) -> (DVec3, DVec3)) -> u32 {
         let first = self.positions.len() as u32;
         for k in 0..self.circle.len() {
             let (position, normal) = place(self.circle[k]);
-            self.vertex(position, normal, value);
+            self.vertex(position, normal, of);
         }
         first
     }

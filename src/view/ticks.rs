@@ -62,16 +62,23 @@ pub fn linear_ticks(range: [f64; 2], count: usize) -> Vec<Tick> {
 /// assert_eq!(ends.map(|tick| tick.label), ["0.33", "17.00"]);
 /// ```
 pub fn end_ticks(range: [f64; 2], is_log: bool) -> Option<[Tick; 2]> {
-    let [low, high] = ascending(range).filter(|[low, high]| low < high)?;
-    if is_log {
-        return Some([low, high].map(|value| Tick { value, label: Decimal::near(value).label() }));
-    }
-    let exponent = (high / 2.0 - low / 2.0).max(SMALLEST).log10().floor() as i32 - 2;
-    let exponent = exponent.max(Decimal::last_exponent(low.abs().max(high.abs())));
-    let rounded =
-        [low, high].map(|value| Decimal { digits: scaled(value, -exponent).round() as i64, exponent });
-    let mut labels = labels_of(rounded.to_vec()).into_iter();
-    Some([low, high].map(|value| Tick { value, label: labels.next().unwrap_or_default() }))
+    let ends = ascending(range).filter(|[low, high]| low < high)?;
+    ticks_at(&ends, is_log).try_into().ok()
+}
+
+/// Ticks at these values, two at least, which ascend; with digits as those of [`end_ticks`].
+pub(super) fn ticks_at(values: &[f64], is_log: bool) -> Vec<Tick> {
+    let labels = match values {
+        &[low, .., high] if !is_log => {
+            let exponent = (high / 2.0 - low / 2.0).max(SMALLEST).log10().floor() as i32 - 2;
+            let exponent = exponent.max(Decimal::last_exponent(low.abs().max(high.abs())));
+            let rounded =
+                |value: &f64| Decimal { digits: scaled(*value, -exponent).round() as i64, exponent };
+            labels_of(values.iter().map(rounded).collect())
+        }
+        _ => values.iter().map(|value| Decimal::near(*value).label()).collect(),
+    };
+    values.iter().zip(labels).map(|(&value, label)| Tick { value, label }).collect()
 }
 
 /// At most `count` ticks in a range of positive numbers for a logarithmic axis, ascending: powers of ten,

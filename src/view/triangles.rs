@@ -1,7 +1,8 @@
 //! Surfaces of triangles as slices: what the renderer and picking take.
 
 use crate::geom::SingleValues;
-use crate::view::{BoundarySurface, IsoSurface, Slice, Solids};
+use crate::view::moves::turned;
+use crate::view::{BoundarySurface, IsoSurface, Slice, Slope, Solids};
 
 /// A surface of triangles as slices.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,6 +20,24 @@ pub struct Triangles<'a> {
     /// Which sides of each triangle are no edges, because it is part of a larger face: bit `k` is for the side from corner `k` to the
     /// next. None if all are edges.
     pub inner_sides: &'a [u8],
+    /// Where each vertex goes if the surface is displaced: so many times this, in model units. None if it stays.
+    pub moves: &'a [[f64; 3]],
+    /// How the moves change around each vertex, so that normals turn as the surface does; none where normals stay as they are.
+    pub slopes: &'a [Slope],
+}
+
+impl Triangles<'_> {
+    /// The vertices, each displaced by so many times its move.
+    pub fn moved_positions(&self, times: f64) -> Vec<[f64; 3]> {
+        let all = self.positions.iter().enumerate();
+        all.map(|(v, p)| self.moves.get(v).map_or(*p, |m| [0, 1, 2].map(|i| p[i] + times * m[i]))).collect()
+    }
+
+    /// The normals of the surface that is displaced by so many times its moves.
+    pub fn turned_normals(&self, times: f64) -> Vec<[f32; 3]> {
+        let all = self.normals.iter().enumerate();
+        all.map(|(v, n)| self.slopes.get(v).map_or(*n, |slope| turned(*n, slope, times))).collect()
+    }
 }
 
 /// Of what has normals.

@@ -8,7 +8,7 @@
 //! is nowhere pinched.
 
 use crate::view::solids::{Frame, MOST_SIDES, cos_sin};
-use crate::view::{Solids, StreamPoint, Streamline};
+use crate::view::{Place, Solids, StreamPoint, Streamline};
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
@@ -47,7 +47,8 @@ impl Default for TubeOptions {
 #[derive(Clone, Copy, Debug)]
 struct Bead {
     at: DVec3,
-    value: f64,
+    /// Its value, and where in the mesh it is.
+    of: (f64, Place),
 }
 
 /// A ring of vertices.
@@ -108,7 +109,7 @@ impl Solids {
         let begin = self.positions.len() as u32;
         let mut end = begin;
         for (i, ring) in rings.iter().enumerate() {
-            let next = self.ring(ring.bead.value, |p| ring.place(p, radius));
+            let next = self.ring(ring.bead.of, |p| ring.place(p, radius));
             if i > 0 {
                 self.band(end, next);
             }
@@ -124,19 +125,19 @@ impl Solids {
 
     fn flat(&mut self, ring: &Ring, radius: f64, is_ahead: bool) {
         let normal = if is_ahead { ring.frame.along } else { -ring.frame.along };
-        let disk = self.ring(ring.bead.value, |p| (ring.place(p, radius).0, normal));
+        let disk = self.ring(ring.bead.of, |p| (ring.place(p, radius).0, normal));
         self.disk(disk, is_ahead);
     }
 
     /// Half a ball beyond a ring whose vertices are there.
     fn round(&mut self, ring: &Ring, from: u32, radius: f64, is_ahead: bool) {
-        let Ring { bead: Bead { at, value }, frame, .. } = *ring;
+        let Ring { bead: Bead { at, of }, frame, .. } = *ring;
         let beyond = if is_ahead { frame.along } else { -frame.along };
         let steps = (self.sides() / 4).max(1);
         let mut before = from;
         for step in 1..steps {
             let [across, along] = cos_sin(FRAC_PI_2 * f64::from(step) / f64::from(steps));
-            let next = self.ring(value, |p| {
+            let next = self.ring(of, |p| {
                 let normal = frame.towards(p) * across + beyond * along;
                 (at + normal * radius, normal)
             });
@@ -144,7 +145,7 @@ impl Solids {
             self.band(low, high);
             before = next;
         }
-        let tip = self.vertex(at + beyond * radius, beyond, value);
+        let tip = self.vertex(at + beyond * radius, beyond, of);
         self.tip(before, tip, is_ahead);
     }
 }
@@ -166,7 +167,7 @@ fn beads(points: &[StreamPoint], value: &mut impl FnMut(&StreamPoint) -> f64) ->
         let at = DVec3::from(point.position);
         let differs = beads.last().is_none_or(|last| direction(last.at, at).is_some());
         if at.is_finite() && differs {
-            beads.push(Bead { at, value: value(point) });
+            beads.push(Bead { at, of: (value(point), point.place) });
         }
     }
     beads

@@ -3,12 +3,14 @@
 mod blocks;
 mod bounds;
 mod damaged;
+mod extremes;
 mod facts;
 mod golden;
 mod histograms;
 mod reader;
 mod reference;
 mod reference_kinds;
+mod regions;
 mod regressions;
 mod roundtrip;
 mod sections;

@@ -2,6 +2,7 @@
 //! the crate, finds the same in files as the crate's decoder does, block by block.
 
 use crate::reader::growth::Growth;
+use crate::reader::wire::Extreme;
 use crate::reader::{self, File, plain};
 use crate::support::builder::{Plan, build, mt_of_splits};
 use crate::support::domains::{Domain, PlainMesh};
@@ -11,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use tetralod::format::{Decoder, EncodeOptions};
 use tetralod::geom::Lattice;
-use tetralod::mesh::{Field, TetMesh, VectorPart};
+use tetralod::mesh::{self, Averaged, Difference, Extremes, Field, TetMesh, VectorPart};
 use tetralod::mt::{
     Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, EdgeUpdate, ErrorCode, FieldInfo, Mt, MtInfo,
     MtKind, MultiTessellation, UpdateId, UpdatePages, VertexId, VertexSplit,
@@ -72,6 +73,14 @@ fn sorted(mut tet: [u32; 4]) -> [u32; 4] {
     tet
 }
 
+fn extremes_of(ours: &[Extreme; 2]) -> Extremes {
+    let [min, max] = ours.each_ref().map(|Extreme { value, place, cell }| {
+        let part = cell.as_ref().map(|(_, part)| part.clone()).filter(|part| !part.is_empty());
+        mesh::Extreme { value: *value, place: *place, cell: cell.as_ref().map(|(cell, _)| *cell), part }
+    });
+    Extremes { min, max }
+}
+
 fn compare_info(file: &File, info: &MtInfo, metadata: &[(String, String)]) {
     let fields = file.info.fields.iter().map(|field| FieldInfo {
         name: field.name.clone(),
@@ -84,6 +93,11 @@ fn compare_info(file: &File, info: &MtInfo, metadata: &[(String, String)]) {
         vector: field.vector.clone().map(|(name, component)| VectorPart { name, component }),
         time: field.time,
         quantization: field.rounding,
+        extremes: field.extremes.as_ref().map(extremes_of),
+        averaged: field.averaged.as_ref().map(|(input, [rms, largest])| Averaged {
+            input: extremes_of(input),
+            difference: Difference { rms: *rms, largest: *largest },
+        }),
     });
     let found = MtInfo {
         kind: MtKind::Edge,

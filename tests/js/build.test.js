@@ -101,6 +101,58 @@ test("what was left out of a file is reported", async () => {
   assert.deepEqual((await build(await file("tets.vtk"))).report.notes, []);
 });
 
+test("labels at cells, and parts that do not touch, become regions", async () => {
+  const corners = [0, 5].flatMap((x) => [`${x} 0 0`, `${x + 1} 0 0`, `${x} 1 0`, `${x} 0 1`]);
+  const cells = "CELLS 2 10\n4 0 1 2 3\n4 4 5 6 7\nCELL_TYPES 2\n10\n10\n";
+  const points = `POINTS 8 double\n${corners.join("\n")}\n`;
+  const data = "CELL_DATA 2\nSCALARS part int 1\nLOOKUP_TABLE default\n8 -4\nPOINT_DATA 8\nSCALARS p double 1\nLOOKUP_TABLE default\n0 1 2 3 4 5 6 7\n";
+  const source = new TextEncoder().encode(`# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n${points}${cells}${data}`);
+  for (const [preserve, names] of [
+    [["part"], ["-4", "8"]],
+    [["components"], ["1", "2"]],
+  ]) {
+    const { bytes } = await build(source.slice(), { preserve });
+    const mt = await MultiTessellation.open(bytes);
+    assert.deepEqual([mt.info.regions.arrays, mt.info.regions.all.map(({ name }) => name)], [preserve, names]);
+    assert.deepEqual(
+      mt.info.fields.map(({ name }) => name),
+      ["p"],
+    );
+    mt.free();
+  }
+  await assert.rejects(build(source.slice(), { preserve: ["rotor"] }), { code: "bad-option", message: /rotor/ });
+});
+
+test("what averaging does to fields at cells is in the report and in the file", async () => {
+  const text =
+    "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\nCELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\nCELL_TYPES 2\n10\n10\nCELL_DATA 2\nSCALARS m double 1\nLOOKUP_TABLE default\n8 4\n";
+  const { bytes, report } = await build(new TextEncoder().encode(text), { cellToPoint: true, units: { m: "kg" } });
+  const [{ name, unit, input, points, difference }] = report.averaged;
+  assert.deepEqual([name, unit, report.averaged.length], ["m", "kg", 1]);
+  const at = ({ value, place, cell }) => [value, place, cell];
+  assert.deepEqual([input.min, input.max].map(at), [
+    [4, [0.25, 0.25, -0.75], 1],
+    [8, [0.25, 0.25, 0.25], 0],
+  ]);
+  assert.deepEqual([points.min, points.max].map(at), [
+    [4, [0, 0, -3], undefined],
+    [8, [0, 0, 1], undefined],
+  ]);
+  assert.ok(Math.abs(difference.rms - Math.sqrt(1.6875)) < 1e-12 && difference.largest === 2.25);
+  const mt = await MultiTessellation.open(bytes);
+  const [field] = mt.info.fields;
+  assert.deepEqual([field.extremes.min, field.extremes.max].map(at), [points.min, points.max].map(at));
+  assert.deepEqual([field.averaged.input.min, field.averaged.input.max].map(at), [input.min, input.max].map(at));
+  assert.deepEqual(field.averaged.difference, difference);
+  mt.free();
+  const plain = await build(await file("small.vti"));
+  assert.deepEqual(plain.report.averaged, []);
+  const other = await MultiTessellation.open(plain.bytes);
+  assert.equal(other.info.fields[0].averaged, undefined);
+  assert.equal(other.info.fields[0].extremes.max.value, other.info.fields[0].max);
+  other.free();
+});
+
 test("files are inspected before they are built", async () => {
   const grid = await inspect(await file("small.vti"));
   assert.deepEqual([grid.format, grid.dims, grid.points, grid.tetrahedra], ["vti", [17, 17, 17], 17 ** 3, 6 * 16 ** 3]);
@@ -235,10 +287,25 @@ describe("broken files give typed errors", () => {
     "cells of 32 bits": [vtu(1, 4294967295), "corrupt", /array "types".*expected 4294967295, found 1/],
     "counts of 64 bits": [vtu("18446744073709551615", 1), "corrupt", /not a count/],
     "more points than there are": [vtu(1000, 1), "corrupt", /array "offsets"/],
-    "polyhedra": [
-      vtk([...one, "CELLS 1 5", "4 0 1 2 3", "CELL_TYPES 1", "42", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]),
+    "a convex point set": [
+      vtk([...one, "CELLS 1 5", "4 0 1 2 3", "CELL_TYPES 1", "41", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]),
       "unsupported",
-      /polyhedron/,
+      /convex point set/,
+    ],
+    "an open polyhedron": [
+      vtk([
+        ...one,
+        "CELLS 1 18",
+        "17 4 3 0 1 2 3 0 1 3 3 0 2 3 3 1 2 2",
+        "CELL_TYPES 1",
+        "42",
+        "POINT_DATA 4",
+        "SCALARS f float",
+        "LOOKUP_TABLE default",
+        "1 2 3 4",
+      ]),
+      "bad-mesh",
+      /cell 0, a polyhedron, .* point 2 twice/,
     ],
     "a point that is not there": [
       vtk([...one, "CELLS 1 5", "4 0 1 2 9", "CELL_TYPES 1", "10", "POINT_DATA 4", "SCALARS f float", "LOOKUP_TABLE default", "1 2 3 4"]),

@@ -26,8 +26,8 @@ const PATIENCE = 90_000;
 /** The part of a picture that the model covers at least; the lines of the box around it are a hundredth. */
 const SHOWN = 0.025;
 
-/** Languages whose blocks are run or checked here if they have a name. */
-const NAMED = ["html", "js", "json", "nginx", "xml", "yaml"];
+/** Languages whose blocks are run or checked here, or are files that the page's commands read, if they have a name. */
+const NAMED = ["html", "js", "json", "nginx", "text", "xml", "yaml"];
 
 /**
  * Blocks without a name: who runs them, or why nobody does.
@@ -40,6 +40,8 @@ const ELSEWHERE = {
   "docs/format.md": ["text: not a program"],
   "docs/hosting.md": ["sh: needs an account of S3"],
   "docs/howto/cluster.md": ["sh: needs a cluster; `cargo xtask test workflows` runs both workflows here", "dockerfile: needs a registry"],
+  "docs/howto/deformed.md": ["sh: the commands of movies.md are run"],
+  "docs/howto/movies.md": ["sh: needs ffmpeg"],
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
 };
 

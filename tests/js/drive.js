@@ -64,7 +64,8 @@ export async function setSlider(page, id, value) {
 export async function picture(page, name) {
   await settle(page);
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
-  const style = "#legend, #loading, #growth, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
+  const style =
+    "#legend, #loading, #growth, #overlay, #handles, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
   // As an element it would be refused by the page's policy.
   await page.evaluate((style) => {
     const sheet = new CSSStyleSheet();

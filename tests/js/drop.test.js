@@ -10,8 +10,11 @@ after(end);
 
 const screenshot = (page, name) => page.screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) });
 
-/** A VTU file of a grid of `n` cubes in each direction, each of six tetrahedra, with the distance to the middle as its field. */
-function gridFile(n) {
+/**
+ * A VTU file of a grid of `n` cubes in each direction, each of six tetrahedra, with the distance to the middle as its field; or with a field at cells
+ * alone, 1 but for cell `peak` with 1000.
+ */
+function gridFile(n, peak) {
   const range = (count) => Array.from({ length: count }, (_, i) => i);
   const points = range((n + 1) ** 3).map((i) => [i % (n + 1), Math.floor(i / (n + 1)) % (n + 1), Math.floor(i / (n + 1) ** 2)]);
   const at = ([x, y, z]) => x + (n + 1) * (y + (n + 1) * z);
@@ -35,8 +38,11 @@ function gridFile(n) {
     );
   const values = points.map((p) => Math.hypot(...p.map((x) => x / n - 0.5)));
   const array = (type, name, numbers, more = "") => `<DataArray type="${type}" Name="${name}" ${more} format="ascii">${numbers.flat().join(" ")}</DataArray>`;
+  const stress = cells.map((_, i) => (i === peak ? 1000 : 1));
+  const data =
+    peak === undefined ? `<PointData>${array("Float64", "distance", values)}</PointData>` : `<CellData>${array("Float64", "stress", stress)}</CellData>`;
   return `<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid><Piece NumberOfPoints="${points.length}" NumberOfCells="${cells.length}">
-<PointData>${array("Float64", "distance", values)}</PointData><Points>${array("Float64", "Points", points, 'NumberOfComponents="3"')}</Points>
+${data}<Points>${array("Float64", "Points", points, 'NumberOfComponents="3"')}</Points>
 <Cells>${array("Int64", "connectivity", cells)}${array(
     "Int64",
     "offsets",
@@ -95,6 +101,57 @@ test("a dropped VTU is built and shown, a broken file leaves all as it is", asyn
   assert.match(await page.innerText("#growth"), new RegExp(`^6,000 tetrahedra: ${size} as VTU, `), "the size is that of the file");
   assert.equal(await page.locator("#volume option:checked").innerText(), "grid.mt");
   assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a field at cells is averaged, and the page says what that does to it", async () => {
+  const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
+  await reach(page, "complete");
+  assert.ok(await page.locator("#legend-note").isHidden(), "a field at points is as it was");
+  await drop(page, "cells.vtu", gridFile(6, 700));
+  const dialog = page.locator("dialog.build");
+  await dialog.getByText("Peaks become lower").waitFor({ timeout: PATIENCE });
+  assert.ok(await dialog.getByLabel("stress, at cells").isChecked(), "there is no other");
+  await dialog.getByRole("button", { name: "Build" }).click();
+  await page.waitForFunction(() => window.tetralodDemo.info?.tetrahedra === 1296 && window.tetralodDemo.state === "complete", undefined, { timeout: PATIENCE });
+  const said = await dialog.getByText("is averaged from cells").innerText();
+  const known =
+    /^stress is averaged from cells: input 1 \(cell 0\) to 1,000 \(cell 700\), at points 1 to ([\d.]+); differs by ([\d.]+) at most, root mean square ([\d.]+)$/;
+  const [, most, largest, rms] = (known.exec(said) ?? assert.fail(said)).map(Number);
+  assert.ok(most < 1000 && most > 1 && rms < largest && largest < 1000, said);
+  await screenshot(page, "page-averaged");
+  await dialog.getByRole("button", { name: "Close" }).click();
+  await page.locator(".histogram-note:visible").getByText("averaged from cells; input 1 to 1,000").waitFor({ timeout: PATIENCE });
+  // An isosurface alone, which a box is shown as first, has no colour bar.
+  await page.locator("input[name=mode][value=solid]").check({ force: true });
+  await page.locator("#legend-note").waitFor({ timeout: PATIENCE });
+  assert.equal(await page.innerText("#legend-note"), "averaged from cells\ninput 1 to 1,000");
+  const [{ extremes, averaged }] = await page.evaluate(() => window.tetralodDemo.info.fields);
+  assert.deepEqual([averaged.input.max.value, averaged.input.max.cell, extremes.max.value > 1], [1000, 700, true]);
+  await screenshot(page, "page-averaged-legend");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("as many fields are ticked as memory has room for", async () => {
+  const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
+  await reach(page, "complete");
+  const arrays = Array.from({ length: 40 }, (_, i) => `<DataArray type="Float32" Name="f${i}" format="appended" offset="0"/>`);
+  const extent = "0 140 0 140 0 140";
+  const image = (names) => `<VTKFile type="ImageData" version="1.0"><ImageData WholeExtent="${extent}" Origin="0 0 0" Spacing="1 1 1"><Piece Extent="${extent}">
+<PointData>${names.join("")}</PointData></Piece></ImageData><AppendedData encoding="raw">_</AppendedData></VTKFile>`;
+  const dialog = page.locator("dialog.build");
+  const ticked = async (names) => {
+    await drop(page, "image.vti", image(names));
+    await dialog.getByText("The build needs").waitFor({ timeout: PATIENCE });
+    await page.waitForFunction(() => document.activeElement?.textContent === "Build", undefined, { timeout: PATIENCE });
+    const count = await dialog.locator("fieldset.choices input:checked").count();
+    await dialog.getByRole("button", { name: "Cancel" }).click();
+    return count;
+  };
+  assert.equal(await ticked(arrays.slice(0, 3)), 3);
+  const count = await ticked(arrays);
+  assert.ok(count > 3 && count < 40, `${count} are ticked`);
   await page.close();
 });
 

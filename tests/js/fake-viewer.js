@@ -43,6 +43,7 @@ const OVERLAY = {
 
 export class TetralodError extends Error {}
 export const absolute = (result) => result;
+export const displaced = (result) => result;
 
 export class Viewer extends EventTarget {
   static async create() {
@@ -103,7 +104,15 @@ export class Viewer extends EventTarget {
   lookFrom = async (side) => this.#move({ yaw: side.length });
   orbit = async (right) => this.#move({ yaw: this.state.camera.yaw + right });
   zoom = async (factor) => this.#move({ distance: this.state.camera.distance * factor });
-  reading = async (point) => ({ position: point, values: Object.fromEntries(this.info.fields.map(({ name }) => [name, 1])), tet: 0, size: 1, error: 0.01 });
+  reading = async (point) => ({
+    position: point,
+    values: Object.fromEntries(this.info.fields.map(({ name }) => [name, 1])),
+    all: this.info.fields.map(() => 1),
+    tet: 0,
+    region: undefined,
+    size: 1,
+    error: 0.01,
+  });
   pick = async (x, y) => this.reading([1 + x / 2, 2 + y / 2, 3]);
   line = async () => ({ at: [0, 1], values: [1, 2] });
   stats = async ({ fractions = [] }) => ({ histogram: [1, 2, 3], percentiles: fractions.map((part) => 1 + part) });

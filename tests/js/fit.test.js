@@ -1,7 +1,7 @@
 // Promise: what of a scene fits another volume is kept, and what does not is named.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { changedScene, checkFields, fitScene, namesParts, withoutParts } from "../../pkg/fit.js";
+import { changedScene, checkNames, fitScene, namesParts, withoutParts } from "../../pkg/fit.js";
 
 const volume = {
   isBox: true,
@@ -51,6 +51,58 @@ test("fields that the volume does not have go, with what needs them", () => {
   const coloured = fit({ isosurfaces: [{ value: 0, field: "T" }], streamlines: { ...flow, fields: ["u", "u", "u"], field: "T" } });
   assert.deepEqual(coloured.scene.isosurfaces, [{ value: 0 }]);
   assert.equal(coloured.scene.streamlines.field, undefined);
+});
+
+test("regions that the volume does not have go, and those that it has stay", () => {
+  const regions = {
+    arrays: ["part"],
+    deviation: 0,
+    all: [
+      { name: "hub", labels: [2] },
+      { name: "7", labels: [7] },
+    ],
+  };
+  const scene = { boundary: {}, regions: ["hub", 7, 2] };
+  assert.deepEqual(fitScene(scene, { ...volume, regions }), { scene, dropped: [], isFirst: false });
+  for (const of of [{ ...volume, regions: { ...regions, all: [] } }, volume]) {
+    const { scene: fitted, dropped } = fitScene(scene, of);
+    assert.deepEqual(fitted, { boundary: {} });
+    assert.ok(dropped.length === 1 && dropped[0].part === "regions" && /no region "hub"/.test(dropped[0].problem));
+    assert.throws(() => checkNames(scene, of), { code: "bad-option", message: /regions.*no region "hub"/ });
+  }
+  checkNames(scene, { ...volume, regions });
+});
+
+test("a threshold stays where the volume has its field and a value in its range", () => {
+  for (const threshold of [{ range: [0, 0.5], field: "p" }, { range: [5, 9] }]) {
+    const scene = /** @type {any} */ ({ boundary: {}, threshold });
+    assert.deepEqual(fit(scene), { scene, dropped: [], isFirst: false });
+    checkNames(scene, volume);
+  }
+  const none = /** @type {any} */ ({ boundary: {}, threshold: { range: [0, 1], field: "w" } });
+  assert.throws(() => checkNames(none, volume), { code: "bad-option", message: /threshold\.field.*no field "w"/ });
+  for (const scene of [none, { boundary: {}, threshold: { range: [7, 8] } }])
+    assert.deepEqual([fit(scene).scene, parts(scene)], [{ boundary: {} }, ["threshold"]]);
+});
+
+test("a vector that displaces is one of the file, by its name or by three fields", () => {
+  const part = (name, component) => ({ name, min: -1, max: 1, vector: { name: "disp", component } });
+  const volume = {
+    isBox: false,
+    bounds: [0, 0, 0, 1, 1, 1],
+    fields: [part("a", 0), part("b", 1), part("c", 2), ...["v_x", "v_y", "v_z", "p"].map((name) => ({ name, min: 0, max: 1 }))],
+  };
+  for (const field of ["disp", "v", "p,a,v_x"]) {
+    const scene = { boundary: {}, deform: { field } };
+    assert.deepEqual(fitScene(scene, volume), { scene, dropped: [], isFirst: false });
+    checkNames(scene, volume);
+  }
+  for (const field of ["p", "a", "w", "p,a", "p,a,w", "p,a,b,c"]) {
+    const scene = { boundary: {}, deform: { field } };
+    const { scene: fitted, dropped } = fitScene(scene, volume);
+    assert.deepEqual([fitted, dropped.map(({ part }) => part)], [{ boundary: {} }, ["deform"]]);
+    assert.throws(() => checkNames(scene, volume), { code: "bad-option", message: /deform\.field/ });
+  }
 });
 
 test("values, planes, boxes, points and lengths of another volume go", () => {
@@ -109,7 +161,7 @@ test("where nothing is named or left, there is the isosurface of a box, and the 
 });
 
 test("changes that name a field which is not there are refused", () => {
-  const named = (scene) => () => checkFields(scene, volume);
+  const named = (scene) => () => checkNames(scene, volume);
   for (const scene of [
     { isosurfaces: [{}, { field: "T" }] },
     { slices: [{ normal: [0, 0, 1], offset: 0, field: "T" }] },

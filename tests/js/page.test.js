@@ -12,6 +12,7 @@ import {
   differing,
   drop,
   end,
+  newPage,
   open,
   PATIENCE,
   picture,
@@ -28,6 +29,7 @@ before(() => begin());
 after(end);
 
 const SMALL = "data/bucky-small.mt";
+const PHONE = { viewport: { width: 360, height: 640 }, hasTouch: true, isMobile: true };
 /** Software draws large pictures slowly. */
 const VIEWPORT = { viewport: { width: 900, height: 620 } };
 /** Where all views are drawn, and nobody looks at details. */
@@ -117,6 +119,37 @@ test("all is reached with keys, and the list of keys has them", async () => {
   await page.close();
 });
 
+/** What the page has measured, by its names. */
+async function measures(page) {
+  await page.waitForFunction(() => document.querySelector("#measures[aria-busy=false] dt"), undefined, { timeout: PATIENCE });
+  return page.evaluate(() =>
+    Object.fromEntries([...document.querySelectorAll("#measures dt")].map((term) => [term.textContent, term.nextSibling.textContent])),
+  );
+}
+
+/** The number of such words, as which `1,234.5` and `−1` are numbers. */
+const numberOf = (words) => Number(words.replaceAll(",", "").replaceAll("−", "-").split(" ")[0]);
+
+/** Whether a number is so near to what it should be that six digits may be the same. */
+const isNear = (found, wanted, part = 2e-5) => Math.abs(found - wanted) <= part * Math.abs(wanted);
+
+/** What a button saves. */
+async function save(page, button) {
+  const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.click(button)]);
+  return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
+}
+
+/** The rows of a table, which is saved as CSV. */
+async function savedRows(page) {
+  await press(page, "x");
+  const { bytes } = await save(page, "[data-export=csv]");
+  return bytes
+    .toString()
+    .trim()
+    .split("\n")
+    .map((row) => row.split(","));
+}
+
 /** A function that fails where a page has accessibility violations. */
 async function checker(page) {
   // As an element it would be refused by the page's policy.
@@ -171,6 +204,9 @@ test("nor has it with several views, probes, a region, messages, the map of bloc
     await press(page, "Shift+1");
     await press(page, "Shift+5");
     await look("Flow with surface and wires");
+    await press(page, "d");
+    await look("a deformed shape");
+    await press(page, "d");
     await page.selectOption("#region", "box");
     await press(page, "1");
     await settle(page);
@@ -182,6 +218,18 @@ test("nor has it with several views, probes, a region, messages, the map of bloc
     await page.locator("#plot path").waitFor({ timeout: PATIENCE });
     await look("probes and a region");
     await screenshot(page, `page-probes-${colorScheme}`);
+    await page.click(".card .over-time");
+    await page.locator("#plot .mark").first().waitFor({ state: "attached", timeout: PATIENCE });
+    await look("probes over time");
+    await screenshot(page, `page-over-time-${colorScheme}`);
+    await page.selectOption("#over-time", "line");
+    await press(page, "n");
+    await page.locator("#plot image").waitFor({ state: "attached", timeout: PATIENCE });
+    await measures(page);
+    await look("values between probes at all times, and measures");
+    await screenshot(page, `page-all-times-${colorScheme}`);
+    await press(page, "g");
+    await page.click(".card .over-time");
     await press(page, "Escape");
     await page.evaluate(() => (location.hash = "#isovalue=99"));
     await page.locator("#empty").waitFor({ timeout: PATIENCE });
@@ -259,8 +307,7 @@ test("the gallery opens scenes with the counts of the paper, and files are opene
 });
 
 test("a phone shows the picture while a control is moved, and keeps the state when it is turned", async () => {
-  const options = { viewport: { width: 360, height: 640 }, hasTouch: true, isMobile: true };
-  const page = await open(SMALL, undefined, options);
+  const page = await open(SMALL, undefined, PHONE);
   await reach(page, "complete");
   await page.locator("#focus").scrollIntoViewIfNeeded();
   const seen = async () => {
@@ -283,7 +330,7 @@ test("a phone shows the picture while a control is moved, and keeps the state wh
   }
   await page.check("#focus");
   await page.selectOption("#axis", "0", { force: true });
-  await addressed(page, /focus=1/);
+  await addressed(page, /axis=0&focus=1/);
   const address = page.url();
   await page.setViewportSize({ width: 740, height: 360 });
   await settle(page);
@@ -328,36 +375,32 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   await page.keyboard.press("p");
   await page.locator(".card").waitFor({ timeout: PATIENCE });
   await press(page, "x");
-  const save = async (button) => {
-    const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.click(button)]);
-    return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
-  };
-  const vtu = await save("[data-export=vtu]");
+  const vtu = await save(page, "[data-export=vtu]");
   assert.equal(vtu.name, "bucky-small.vtu");
   assert.ok(vtu.bytes.includes(`NumberOfPoints="${stats.vertices}" NumberOfCells="${stats.tetrahedra}"`));
-  assert.ok((await save("[data-export=vtk]")).bytes.includes(`CELL_TYPES ${stats.tetrahedra}\n`));
+  assert.ok((await save(page, "[data-export=vtk]")).bytes.includes(`CELL_TYPES ${stats.tetrahedra}\n`));
   const triangles = await page.evaluate(async () => {
     const { viewer } = window.tetralodDemo;
     return (await viewer.isosurface(viewer.state.isosurfaces[0].value)).indices.length / 3;
   });
   assert.ok(triangles > 100);
-  assert.equal((await save("[data-export=stl]")).bytes.readUInt32LE(80), triangles);
-  assert.ok((await save("[data-export=ply]")).bytes.includes(`element face ${triangles}\n`));
+  assert.equal((await save(page, "[data-export=stl]")).bytes.readUInt32LE(80), triangles);
+  assert.ok((await save(page, "[data-export=ply]")).bytes.includes(`element face ${triangles}\n`));
   await page.selectOption("#surface-kind", "boundary");
-  const glb = await save("[data-export=glb]");
+  const glb = await save(page, "[data-export=glb]");
   assert.deepEqual([glb.name, glb.bytes.toString("latin1", 0, 4)], ["bucky-small-boundary.glb", "glTF"]);
   const { accessors, meshes } = JSON.parse(glb.bytes.toString("utf8", 20, 20 + glb.bytes.readUInt32LE(12)));
   const { COLOR_0: colours, POSITION: places } = meshes[0].primitives[0].attributes;
   assert.equal(accessors[colours].count, accessors[places].count, "each vertex has a colour");
-  const rows = (await save("[data-export=csv]")).bytes.toString().trim().split("\n");
-  assert.equal(rows[0], "what,x,y,z,distance,density");
-  assert.match(rows[1], /^probe A,/);
+  const rows = await savedRows(page);
+  assert.equal(String(rows[0]), "what,x,y,z,distance,density");
+  assert.equal(rows[1][0], "probe A");
 
   // The axes are in the picture, where they are asked for.
   const sizes = [];
   for (const isOverlaid of [true, false]) {
     await page.setChecked("#shot-overlay", isOverlaid);
-    const { name, bytes } = await save("#shot");
+    const { name, bytes } = await save(page, "#shot");
     assert.match(name, /^bucky-small-\d+x\d+\.png$/);
     sizes.push(
       await page.evaluate(async (base64) => {
@@ -381,6 +424,108 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   assert.ok(copied.meshes.length > 0 && copied.frames.length > 0 && copied.received > 0);
   await screenshot(page, "page-data");
   assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+/** What a video is when it is played: its size, its length, and how many different pictures a player finds, in each of `count` equal parts. */
+async function played(bytes, count) {
+  const page = await newPage();
+  const found = await page.evaluate(
+    async ([base64, count]) => {
+      const video = document.createElement("video");
+      video.muted = true;
+      const event = (name) =>
+        new Promise((resolve, reject) => {
+          video.addEventListener(name, resolve, { once: true });
+          video.addEventListener("error", () => reject(new Error(video.error?.message)), { once: true });
+        });
+      const ready = event("loadeddata");
+      video.src = `data:video/webm;base64,${base64}`;
+      await ready;
+      const { videoWidth: width, videoHeight: height, duration } = video;
+      const context = new OffscreenCanvas(width, height).getContext("2d");
+      const pictures = new Set();
+      const seen = () => {
+        context.drawImage(video, 0, 0);
+        return context.getImageData(0, 0, width, height).data.reduce((hash, byte) => Math.imul(hash, 31) + byte, 0);
+      };
+      let last;
+      for (let i = 0; i < count; i++) {
+        const there = event("seeked");
+        video.currentTime = ((i + 0.5) * duration) / count;
+        await there;
+        // The picture may come some refreshes after the event.
+        let picture = seen();
+        for (let tries = 0; picture === last && tries < 100; tries++) {
+          await new Promise(requestAnimationFrame);
+          picture = seen();
+        }
+        pictures.add((last = picture));
+      }
+      return { width, height, duration, pictures: pictures.size };
+    },
+    [bytes.toString("base64"), count],
+  );
+  await page.close();
+  return found;
+}
+
+test("movies are recorded from all sides, over time and through a period, and can be played", async () => {
+  const page = await open(FLOW, undefined, COARSE);
+  await reach(page, "complete");
+  await setSlider(page, "error", 80);
+  await press(page, "1");
+  await press(page, "x");
+  const camera = () => page.evaluate(() => window.tetralodDemo.viewer.state.camera);
+  const steps = await page.evaluate(() => window.tetralodDemo.info.fields.filter(({ name }) => name === "pressure").length);
+  // Nothing swings before a vector displaces.
+  assert.deepEqual(await page.locator("#movie-kind option").evaluateAll((all) => all.map(({ disabled }) => disabled)), [false, false, true]);
+  await press(page, "d");
+  for (const [kind, pictures, rate] of /** @type {const} */ ([
+    ["turntable", 7, 12],
+    ["steps", undefined, 5],
+    ["swing", 5, 24],
+  ])) {
+    const before = [await camera(), await page.inputValue("#time")];
+    await page.selectOption("#movie-kind", kind);
+    assert.equal(await page.locator("#movie-pictures").isDisabled(), pictures === undefined);
+    if (pictures) await page.fill("#movie-pictures", String(pictures));
+    await page.selectOption("#movie-rate", String(rate));
+    await page.locator("#movie").focus();
+    const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.keyboard.press("Enter")]);
+    assert.equal(download.suggestedFilename(), `abc-flow-${kind}.webm`);
+    const count = pictures ?? steps;
+    const found = await played(await readFile(await download.path()), count);
+    const size = await page.evaluate(() => {
+      const canvas = document.getElementById("canvas");
+      return [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * devicePixelRatio) & ~1);
+    });
+    assert.deepEqual([found.width, found.height], size);
+    assert.ok(Math.abs(found.duration - count / rate) < 0.01, `${kind}: ${found.duration} s`);
+    // All are different, but at the ends of a period those on the way there and back.
+    assert.ok(found.pictures >= (kind === "swing" ? 3 : count), `${kind}: ${found.pictures} of ${count} pictures`);
+    // All is as it was.
+    await page.waitForFunction(() => document.getElementById("movie").textContent === "Record as WebM", undefined, { timeout: PATIENCE });
+    assert.deepEqual([await camera(), await page.inputValue("#time")], before, kind);
+  }
+  // It can be ended, and what there is is saved.
+  await page.selectOption("#movie-kind", "turntable");
+  await page.click("#movie");
+  await page.waitForFunction(() => /^Picture [3-9]/.test(document.getElementById("movie-words").textContent), undefined, { timeout: PATIENCE });
+  const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.click("#movie")]);
+  const found = await played(await readFile(await download.path()), 1);
+  assert.ok(found.duration > 0.1 && found.duration < 2, `${found.duration} s`);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a browser that cannot encode videos says so", async () => {
+  const page = await open(SMALL, (page) => page.addInitScript(() => Reflect.deleteProperty(window, "VideoEncoder")), COARSE);
+  await reach(page, "complete");
+  await press(page, "x");
+  await page.click("#movie");
+  await page.locator("#message").waitFor({ timeout: PATIENCE });
+  assert.match(await page.innerText("#message"), /movie could not be made.*cannot encode videos/s);
   await page.close();
 });
 
@@ -438,6 +583,135 @@ test("an empty picture says why, and what does nothing is disabled", async () =>
   const numbers = ticks.map((words) => Number(words.replaceAll("−", "-")));
   const off = Math.max(Math.abs(Math.min(...numbers) - min), Math.abs(Math.max(...numbers) - max));
   assert.ok(off < 0.002 * (max - min), `${ticks}: ${min} to ${max}`);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+/** The planes that are drawn, when there are so many. @param {"clips" | "slices"} name @param {number} count */
+async function planesOf(page, name, count) {
+  await page.waitForFunction(([name, count]) => window.tetralodDemo.viewer.state[name]?.length === count, [name, count], { timeout: PATIENCE });
+  return page.evaluate((name) => window.tetralodDemo.viewer.state[name].map(({ normal, offset }) => [...normal, offset]), name);
+}
+
+test("planes are oblique and several, with numbers and a handle, and a link shows the same", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  assert.ok(await page.locator("#handles").isHidden(), "nothing is cut");
+  await show(page, "Boundary");
+  const across = await still(page, "planes-across");
+  await page.fill("#normal-x", "1");
+  await page.fill("#position", "0.6");
+  const [[x, y, z, offset]] = await planesOf(page, "clips", 1);
+  assert.ok(x === y && z === 0 && Math.abs(x + Math.SQRT1_2) < 1e-12 && Math.abs(offset + 0.6) < 1e-9, `${[x, y, z, offset]}`);
+  assert.equal(await page.locator("#axis option:checked").innerText(), "oblique");
+  const oblique = await still(page, "planes-oblique");
+  assert.ok(differing(across, oblique) > 0.05, "another part is cut away");
+  await page.click("#add-plane");
+  const corner = await still(page, "planes-two");
+  assert.ok(differing(oblique, corner) > 0.02, "both cut");
+
+  // The arrow is dragged along, and stays under the pointer; that is one step.
+  await addressed(page, /planes=/);
+  const before = page.url();
+  const arrow = page.locator("#handles .arrow");
+  const middle = async () => {
+    const { x, y, width, height } = await arrow.boundingBox();
+    return [x + width / 2, y + height / 2];
+  };
+  const [from, foot] = [await middle(), await page.locator("#handles .ball").boundingBox()];
+  const way = [from[0] - foot.x - foot.width / 2, from[1] - foot.y - foot.height / 2];
+  const to = from.map((at, i) => at + way[i] / 3);
+  await page.mouse.move(from[0], from[1]);
+  await page.mouse.down();
+  await page.mouse.move(to[0], to[1], { steps: 5 });
+  const off = (await middle()).map((at, i) => at - to[i]);
+  assert.ok(Math.hypot(...off) < 6, `the arrow is ${off} from the pointer`);
+  await page.mouse.up();
+  const moved = await planesOf(page, "clips", 2);
+  assert.ok(moved[1][3] !== -0.5 && moved[0][3] === offset, "the chosen one has moved");
+  await page.waitForFunction((url) => location.href !== url, before, { timeout: PATIENCE });
+  await page.keyboard.press("Control+z");
+  await page.waitForFunction((url) => location.href === url, before, { timeout: PATIENCE });
+
+  // The ball tilts it, by keys, too; the plane that faces the eye has a normal of its own.
+  await page.locator("#handles .ball").focus();
+  await page.keyboard.press("ArrowRight");
+  const tilted = await planesOf(page, "clips", 2);
+  assert.ok(Math.abs(Math.hypot(...tilted[1].slice(0, 3)) - 1) < 1e-12 && tilted[1][0] > -0.999, `${tilted[1]}`);
+  await screenshot(page, "page-planes");
+  await page.selectOption("#axis", "view");
+  const facing = (await planesOf(page, "clips", 2))[1];
+  const [, , towards] = await page.evaluate(() => window.tetralodDemo.viewer.overlay.rotation);
+  assert.ok(
+    towards.every((part, i) => Math.abs(part - facing[i]) < 2e-3),
+    "what is near is hidden",
+  );
+
+  await addressed(page, /normal=1,1,0&planes=-0\.45\d,.*&plane=2/);
+  const [address, shown] = [page.url(), await still(page, "planes-facing")];
+  await page.reload();
+  await reach(page, "complete");
+  assert.equal(differing(shown, await still(page, "planes-reloaded")), 0, "a link shows the same");
+  assert.equal(page.url(), address);
+  assert.deepEqual((await planesOf(page, "clips", 2))[1], facing);
+
+  // As sections they have places of their own; the mesh leaves out whole cells at the first.
+  await show(page, "Slice");
+  await planesOf(page, "slices", 2);
+  await settle(page);
+  assert.ok((await demo(page, "frame")).triangles > 0);
+  await screenshot(page, "page-planes-slice");
+  await show(page, "Mesh");
+  await planesOf(page, "clips", 1);
+  assert.deepEqual(await page.evaluate(() => window.tetralodDemo.viewer.state.cells.cut.offset), offset);
+  await page.click("#remove-plane");
+  await planesOf(page, "clips", 0);
+
+  // One that leaves nothing says so, whichever is chosen.
+  await page.evaluate(() => (location.hash = "#view=solid&cut=400&planes=1,0,0,1,1000,500"));
+  await page.locator("#empty").waitFor({ timeout: PATIENCE });
+  assert.match(await page.innerText("#empty"), /Everything is cut away: the model lies between x = 0 and 1/);
+  await page.click("#empty-act");
+  await page.locator("#empty").waitFor({ state: "hidden", timeout: PATIENCE });
+  assert.equal((await planesOf(page, "clips", 2))[1][3], -0.5);
+  await page.evaluate(() => (location.hash = "#view=solid&cut=600&planes=0,1,0,0,400,500"));
+  await page.locator("#empty").waitFor({ timeout: PATIENCE });
+  assert.match(await page.innerText("#empty"), /together the planes leave nothing/);
+  await page.click("#empty-act");
+  await page.locator("#empty").waitFor({ state: "hidden", timeout: PATIENCE });
+  await planesOf(page, "clips", 1);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the handle of a plane is dragged with a finger", async () => {
+  const page = await open(SMALL, undefined, PHONE);
+  await reach(page, "complete");
+  await show(page, "Boundary");
+  await page.locator("#handles .arrow").waitFor({ timeout: PATIENCE });
+  await settle(page);
+  const [before, camera] = [await planesOf(page, "clips", 1), await page.evaluate(() => window.tetralodDemo.viewer.state.camera)];
+  const touch = await page.context().newCDPSession(page);
+  for (const name of ["arrow", "ball"]) {
+    const { x, y, width, height } = await page.locator(`#handles .${name}`).boundingBox();
+    const at = (part) => [{ x: x + width / 2 + 25 * part, y: y + height / 2 + 15 * part }];
+    await touch.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: at(0) });
+    for (const part of [0.5, 1]) await touch.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: at(part) });
+    await touch.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+    await page.waitForFunction(
+      ([name, before]) => {
+        const { normal, offset } = window.tetralodDemo.viewer.state.clips[0];
+        return name === "arrow" ? offset !== before[3] : normal[1] !== before[1];
+      },
+      [name, before[0]],
+      { timeout: PATIENCE },
+    );
+  }
+  assert.deepEqual(await page.evaluate(() => window.tetralodDemo.viewer.state.camera), camera, "the camera stays");
+  await page.locator("#position").scrollIntoViewIfNeeded();
+  const panel = await page.locator("#panel").evaluate(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth);
+  assert.ok(panel <= 1, "the settings fit");
+  await screenshot(page, "page-phone-planes");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
@@ -509,6 +783,143 @@ test("any views are shown together, and what is beside the view stays when its s
   await has("isosurfaces", "boundary", "cells");
   await page.click("#reset");
   await has("isosurfaces");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("parts are hidden, shown alone and coloured, and a link shows the same", async () => {
+  const page = await open("data/turbine.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  const boxes = page.locator("#region-list input");
+  assert.equal(await boxes.count(), 12);
+  const shown = () => page.evaluate(() => window.tetralodDemo.viewer.state.regions ?? "all");
+  const has = async (wanted) => {
+    for (const until = Date.now() + PATIENCE; String(await shown()) !== String(wanted) && Date.now() < until; ) await page.waitForTimeout(50);
+    assert.deepEqual(await shown(), wanted);
+  };
+  const whole = await still(page, "parts-all");
+  await boxes.nth(11).focus();
+  await page.keyboard.press("Space");
+  await has(["1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11"]);
+  await addressed(page, /hidden=11(&|$)/);
+  await page.getByRole("button", { name: "only 2" }).click();
+  await has(["2"]);
+  await settle(page);
+  const hub = await still(page, "parts-hub");
+  assert.ok(differing(whole, hub) > 0.05, "the others are gone");
+  const mesh = await page.evaluate(async () => {
+    const { tets, neighbors, positions } = await window.tetralodDemo.viewer.mesh();
+    const inRange = (array, count) => array.every((x) => x < count || x === 0xffffffff);
+    return {
+      count: tets.length / 4,
+      all: window.tetralodDemo.step.tetrahedra,
+      fits: tets.every((v) => v < positions.length / 3) && inRange(neighbors, tets.length / 4),
+    };
+  });
+  assert.ok(mesh.fits && mesh.count > 0 && mesh.count < mesh.all, "the mesh is that of the part");
+  await page.click("#other-regions");
+  await has(["1", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12"]);
+  await page.click("#other-regions");
+  await has(["2"]);
+  await addressed(page, /hidden=0,2-11(&|$)/);
+  await page.getByRole("checkbox", { name: "2", exact: true }).uncheck();
+  await has([]);
+  await page.getByRole("button", { name: "Show all parts" }).click();
+  await has("all");
+  await page.selectOption("#boundary-colour", "region");
+  await page.getByRole("button", { name: "only 5" }).click();
+  await has(["5"]);
+  await settle(page);
+  assert.ok(await page.locator("#legend").isHidden(), "the colours mean no values");
+  await screenshot(page, "page-parts");
+  const [address, coloured] = [page.url(), await still(page, "parts-coloured")];
+  await page.reload();
+  await reach(page, "complete");
+  await has(["5"]);
+  assert.equal(differing(coloured, await still(page, "parts-reloaded")), 0, "a link shows the same");
+  assert.equal(page.url(), address);
+  // By a label, too, and by both.
+  await page.evaluate(() => window.tetralodDemo.viewer.set({ regions: [2, "3"] }));
+  assert.equal(await page.evaluate(() => window.tetralodDemo.viewer.set({ regions: [13] }).catch(({ code }) => code)), "bad-option");
+  // What a probe is in is hidden, and shown alone. The hub is in the middle.
+  await page.getByRole("button", { name: "only 2" }).click();
+  await has(["2"]);
+  await settle(page);
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("p");
+  await page.locator(".card").waitFor({ timeout: PATIENCE });
+  assert.match(await page.innerText(".card"), /part\s+2/);
+  await page.click("#all-regions");
+  await has("all");
+  await page.getByRole("button", { name: "Hide this part: 2" }).click();
+  await has(["1", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12"]);
+  await page.getByRole("button", { name: "Show it alone: 2" }).click();
+  await has(["2"]);
+  // Another volume has no such parts.
+  await page.evaluate(() => void (location.search = "?url=data/bucky-small.mt"));
+  await reach(page, "complete");
+  assert.ok(await page.locator("#regions").isHidden());
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("cells of a range, bands and extremes are shown, and a link shows the same", async () => {
+  const page = await open("data/bucky.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  await show(page, "Boundary");
+  await settle(page);
+  const whole = await still(page, "threshold-none");
+  await page.check("#thresholded");
+  await settle(page);
+  const { min, max } = (await demo(page, "info")).fields[0];
+  const state = () => page.evaluate(() => window.tetralodDemo.viewer.state);
+  assert.deepEqual((await state()).threshold, { field: "density", range: [Number((min + (max - min) / 2).toPrecision(5)), max] });
+  assert.ok(differing(whole, await still(page, "threshold-half")) > 0.05, "cells below the range are gone");
+  await page.fill("#threshold-low", "0.3");
+  await addressed(page, /threshold=0.3,/);
+  assert.deepEqual((await demo(page, "request")).ranges, [[0.3, max]]);
+  await settle(page);
+  const within = await page.evaluate(async () => {
+    const { tets, field, offset, scale } = await window.tetralodDemo.viewer.mesh();
+    const shown = tets.filter((v) => v !== 0xffffffff);
+    return { count: shown.length, least: shown.reduce((least, v) => Math.min(least, offset + scale * field[v]), Infinity) };
+  });
+  assert.ok(within.count > 0 && within.least >= 0.3 - 1e-6, JSON.stringify(within));
+
+  await page.selectOption("#bands", "5");
+  await settle(page);
+  assert.equal((await state()).colours.bands, 5);
+  const colours = await page.evaluate(() => window.tetralodDemo.viewer.legend.colours);
+  assert.equal(new Set(colours).size, 5);
+  assert.equal(await page.locator("#legend-ticks span").count(), 6);
+  const banded = await still(page, "threshold-bands");
+
+  await page.locator("#canvas").focus();
+  await press(page, "m");
+  await page.locator("#overlay .extremes path").nth(1).waitFor({ timeout: PATIENCE });
+  const words = await page.locator("#overlay .extremes text").allTextContents();
+  assert.match(words.join("; "), /^min of all .*; max of all 1\.\d+$/);
+  assert.equal(await page.locator("#legend-marks span").count(), 2);
+  await screenshot(page, "page-inspect");
+
+  await addressed(page, /extremes=1/);
+  const address = page.url();
+  await page.reload();
+  await reach(page, "complete");
+  await settle(page);
+  assert.equal(differing(banded, await still(page, "threshold-reloaded")), 0, "a link shows the same");
+  assert.equal(page.url(), address);
+  assert.equal(await page.locator("#overlay .extremes path").count(), 2);
+
+  // No cell has such values.
+  await page.fill("#threshold-high", "0.1");
+  assert.ok(!(await page.locator("#threshold-high").evaluate((input) => input.validity.valid)));
+  await page.evaluate(() => (location.hash = "#view=solid&threshold=1.2,1.21"));
+  await page.locator("#empty").waitFor({ timeout: PATIENCE });
+  assert.match(await page.innerText("#empty"), /No cell has all values of density from 1.2/);
+  await page.click("#empty-act");
+  await page.locator("#empty").waitFor({ state: "hidden", timeout: PATIENCE });
+  assert.ok(!(await page.isChecked("#thresholded")));
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
@@ -835,6 +1246,275 @@ test("colours and values mean the same at all times", async () => {
   await page.close();
 });
 
+test("the value at a probe is shown over time, and only the probe is refined for it", async () => {
+  const page = await open(FLOW, undefined, COARSE);
+  await reach(page, "complete");
+  await setSlider(page, "error", 80);
+  await press(page, "4");
+  await press(page, "v");
+  await page.keyboard.press("p");
+  await page.locator(".card .over-time").waitFor({ timeout: PATIENCE });
+  const before = await settle(page).then(() => demo(page, "stats"));
+  await page.locator(".card .over-time").focus();
+  await page.keyboard.press("Enter");
+  await page.locator("#plot .mark").first().waitFor({ state: "attached", timeout: PATIENCE });
+  assert.equal(await page.evaluate(() => document.activeElement?.className), "over-time");
+  assert.match(await page.innerText("#plot-title"), /^pressure over time at A$/);
+  assert.equal(await page.inputValue("#over-time"), "1");
+  await settle(page);
+  const [steps, range] = await page.evaluate(() => {
+    const own = window.tetralodDemo.info.fields.filter(({ name }) => name === "pressure");
+    return [own.length, Math.max(...own.map(({ max }) => max)) - Math.min(...own.map(({ min }) => min))];
+  });
+  // A part between each two times.
+  const path = await page.locator("#plot path").getAttribute("d");
+  assert.equal(path.split(/[ML]/).length - 1, 2 * (steps - 1));
+  const { needs, error } = await demo(page, "request");
+  assert.equal(needs.length, steps - 1);
+  const after = await demo(page, "stats");
+  assert.ok(after.tetrahedra < 1.5 * before.tetrahedra + 500, `${before.tetrahedra}, then ${after.tetrahedra} tetrahedra`);
+  const values = () =>
+    page.evaluate(async () => {
+      const { viewer, info, request } = window.tetralodDemo;
+      const { all } = await viewer.reading(request.needs[0].box.slice(0, 3));
+      return all.filter((_, i) => info.fields[i].name === "pressure");
+    });
+  const found = await values();
+  const rows = await savedRows(page);
+  const [time, pressure] = ["time", "pressure"].map((name) => rows[0].indexOf(name));
+  const overTime = rows.filter(([what]) => what === "probe A over time");
+  assert.deepEqual(
+    overTime.map((row) => Number(row[time])),
+    Array.from({ length: steps }, (_, i) => i),
+  );
+  assert.ok(overTime.every((row, i) => Math.abs(Number(row[pressure]) - found[i]) < 1e-5 * range));
+  // They are as good as was asked for, at all times.
+  await press(page, "g");
+  await setSlider(page, "error", 0);
+  await settle(page);
+  const exact = await values();
+  const most = Math.max(...exact.map((value, i) => Math.abs(value - found[i])));
+  assert.ok(most > 0 && most <= (2 * Number.parseFloat(error) * range) / 100, `${most} of ${range}, ${error} asked for`);
+  // A link has it, and without it there is nothing to plot for one probe.
+  assert.match(new URL(page.url()).hash, /over-time=1/);
+  await page.selectOption("#over-time", "");
+  assert.ok(await page.locator("#plot").isHidden());
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the values between probes are shown at all times, and only the way between them is refined", async () => {
+  const page = await open(FLOW, undefined, COARSE);
+  await reach(page, "complete");
+  await setSlider(page, "error", 80);
+  const before = await settle(page).then(() => demo(page, "stats"));
+  await addressed(page, /error=80/);
+  // A link has it. Of one probe alone there is the value over time.
+  await page.evaluate(() => (location.hash += "&view=slice&probes=1,1,1,5,1,1&over-time=line"));
+  await page.locator("#plot image").waitFor({ state: "attached", timeout: PATIENCE });
+  assert.equal(await page.inputValue("#over-time"), "line");
+  assert.match(await page.innerText("#plot-title"), /^pressure from A to B, 4 apart, at all times$/);
+  await settle(page);
+  const steps = await page.evaluate(() => window.tetralodDemo.info.fields.filter(({ name }) => name === "pressure").length);
+  const { needs, error } = await demo(page, "request");
+  assert.equal(needs.length, steps - 1);
+  assert.ok(needs.every(({ orientedBox }) => String(orientedBox.center) === "3,1,1" && String(orientedBox.halfAxes[0]) === "2,0,0"));
+  const along = await demo(page, "stats");
+  const everywhere = await page.evaluate(
+    ([needs, error]) => window.tetralodDemo.viewer.refine({ error, needs: needs.map(({ error, field }) => ({ error, field })) }),
+    [needs, error],
+  );
+  const [more, most] = [along, everywhere].map(({ tetrahedra }) => tetrahedra - before.tetrahedra);
+  assert.ok(more < most / 2, `${before.tetrahedra} tetrahedra, and ${more} more; ${most} for all times everywhere`);
+
+  // The mesh of the page's own request again.
+  await setSlider(page, "error", 79);
+  await settle(page);
+  // The picture has a frame around the time that is shown.
+  const frame = () => page.locator("#plot .step").getAttribute("y").then(Number);
+  const first = await frame();
+  await setSlider(page, "time", steps - 1);
+  await settle(page);
+  assert.ok((await frame()) < first, "later is higher");
+  await page.waitForFunction(() => window.tetralodDemo.viewer.legend?.label === "pressure", undefined, { timeout: PATIENCE });
+  const colours = await page.evaluate(async () => {
+    const image = new Image();
+    image.src = document.querySelector("#plot image").getAttribute("href");
+    await image.decode();
+    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    const hex = (i) => `#${[...data.subarray(i, i + 3)].map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+    const found = new Set(Array.from({ length: data.length / 4 }, (_, i) => 4 * i).flatMap((i) => (data[i + 3] === 255 ? hex(i) : [])));
+    return { found: found.size, others: [...found].filter((colour) => !window.tetralodDemo.viewer.legend.colours.includes(colour)) };
+  });
+  assert.ok(colours.found > 10 && colours.others.length === 0, JSON.stringify(colours));
+
+  const rows = await savedRows(page);
+  const [x, distance, time, pressure] = ["x", "distance", "time", "pressure"].map((name) => rows[0].indexOf(name));
+  const all = rows.filter(([what]) => what === "line over time");
+  assert.equal(all.length, 65 * steps);
+  assert.ok(all.every((row) => Math.abs(Number(row[x]) - 1 - Number(row[distance])) < 1e-9));
+  const ofLast = all.filter((row) => Number(row[time]) === steps - 1);
+  // At the time that is shown they are those of the line itself.
+  const shown = rows.filter(([what]) => what === "line");
+  for (const end of [0, 4]) {
+    const [one, other] = [ofLast, shown].map((rows) => Number(rows.find((row) => Math.abs(Number(row[distance]) - end) < 1e-9)[pressure]));
+    assert.ok(Math.abs(one - other) < 1e-6, `${one} and ${other} at ${end}`);
+  }
+
+  // By keyboard, with a third probe, and back.
+  await page.evaluate(() => (location.hash = location.hash.replace("5,1,1", "5,1,1,5,4,1")));
+  await page.waitForFunction((count) => window.tetralodDemo.request.needs.length === count, 2 * (steps - 1), { timeout: PATIENCE });
+  await page.waitForFunction(() => /7 long, 90° at B, at all times$/.test(document.querySelector("#plot-title").textContent), undefined, { timeout: PATIENCE });
+  await page.locator("#over-time").focus();
+  await page.keyboard.press("Home");
+  await addressed(page, /^(?!.*over-time)/);
+  assert.equal((await demo(page, "request")).needs, undefined);
+  await page.locator("#plot path").waitFor({ state: "attached", timeout: PATIENCE });
+  await press(page, "Control+z");
+  await addressed(page, /over-time=line/);
+  await page.locator(".card button").first().click();
+  await page.locator(".card button").first().click();
+  await page.waitForFunction(() => /over time at A$/.test(document.querySelector("#plot-title").textContent), undefined, { timeout: PATIENCE });
+  assert.ok(await page.locator("#over-time option[value=line]").evaluate((option) => option.disabled));
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("distances, the angle, areas and the volume are measured, in the unit that is said", async () => {
+  const page = await open(FLOW, undefined, COARSE);
+  await reach(page, "complete");
+  await setSlider(page, "error", 80);
+  await addressed(page, /error=80/);
+  await page.evaluate(() => (location.hash += "&view=slice&probes=4,1,1,1,1,1,1,5,1"));
+  await page.locator(".card").nth(2).waitFor({ timeout: PATIENCE });
+  // As the page writes it: what follows is another step.
+  await addressed(page, /^#view=slice&error=80&probes=/);
+  await page.fill("#unit", "mm");
+  await addressed(page, /unit=mm/);
+  const names = () => page.locator("#overlay .name").allTextContents();
+  assert.ok(
+    (await names()).every((name) => /^[xyz] in mm$/.test(name)),
+    String(await names()),
+  );
+  assert.match(await page.textContent("#overlay .scale-bar"), /^[\d.]+ mm/);
+  assert.match(await page.locator(".card").first().innerText(), /position\s+4, 1, 1 mm\s+cell size\s+[\d.]+ mm/);
+  assert.match(await page.innerText("#plot-title"), /7 mm long, 90° at B$/);
+  await press(page, "n");
+  const found = await measures(page);
+  assert.deepEqual(
+    ["A to B", "B to C", "Angle at B"].map((what) => found[what]),
+    ["3 mm", "4 mm", "90°"],
+  );
+  // The domain is a cube, and the plane is one of its own.
+  const [, , low, , , high] = (await demo(page, "info")).bounds;
+  const side = high - low;
+  for (const [what, wanted, unit] of /** @type {const} */ ([
+    ["Area of the section", side ** 2, "mm²"],
+    ["Area of the boundary", 6 * side ** 2, "mm²"],
+    ["Volume", side ** 3, "mm³"],
+  ]))
+    assert.ok(isNear(numberOf(found[what]), wanted) && found[what].endsWith(` ${unit}`), `${what}: ${found[what]}, ${wanted}`);
+  await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
+  await page.locator("#copy-measures").focus();
+  await page.keyboard.press("Enter");
+  await page.locator("#note", { hasText: "Measures copied" }).waitFor();
+  const rows = (await page.evaluate(() => navigator.clipboard.readText())).trim().split("\n");
+  assert.deepEqual([rows[0], rows[1], rows.length], ["what,value,unit", "A to B,3,mm", Object.keys(found).length + 1]);
+  await screenshot(page, "page-measures");
+  assert.deepEqual((await savedRows(page))[0].slice(0, 5), ["what", "x in mm", "y in mm", "z in mm", "distance in mm"]);
+
+  // A step to undo, and part of a link; of another model nobody knows it.
+  await press(page, "Control+z");
+  await addressed(page, /^(?!.*unit)/);
+  assert.equal(await page.inputValue("#unit"), "");
+  await press(page, "n");
+  assert.equal((await measures(page))["A to B"], "3");
+  await press(page, "Control+Shift+z");
+  await addressed(page, /unit=mm/);
+  await page.reload();
+  await reach(page, "complete");
+  assert.equal(await page.inputValue("#unit"), "mm");
+  await openAnother(page, SMALL, "edge");
+  assert.equal(await page.inputValue("#unit"), "");
+  await page.evaluate(() => (location.hash += "&unit=much-too-long-for-one"));
+  await noted(page, /means nothing: .*unit=/);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("what is measured is that of the parts and cells that are shown", async () => {
+  const page = await open("data/turbine.mt", undefined, COARSE);
+  await reach(page, "complete");
+  const { regions } = await demo(page, "info");
+  await press(page, "n");
+  const volumes = regions.all.map(({ volume }) => volume);
+  const near = async (wanted, part) => {
+    const found = await measures(page);
+    assert.ok(isNear(numberOf(found.Volume), wanted, part), `${found.Volume}, ${wanted}`);
+    return found;
+  };
+  const whole = await near(
+    volumes.reduce((sum, volume) => sum + volume),
+    1e-2,
+  );
+  await page.evaluate(() => (location.hash = "#hidden=0-3,5-11"));
+  await settle(page);
+  const part = await near(volumes[4], 1e-2);
+  assert.ok(numberOf(part["Area of the boundary"]) < numberOf(whole["Area of the boundary"]));
+  await page.evaluate(() => {
+    const [{ min, max }] = window.tetralodDemo.info.fields;
+    location.hash = `#threshold=${(min + max) / 2},${max}`;
+  });
+  await settle(page);
+  const wanted = await page.evaluate(async () => {
+    const { tets, positions, field, offset, scale } = await window.tetralodDemo.viewer.mesh();
+    let [volume, integral] = [0, 0];
+    for (let t = 0; t < tets.length; t += 4) {
+      const corners = [...tets.subarray(t, t + 4)];
+      if (corners.includes(0xffffffff)) continue;
+      const [a, b, c, d] = corners.map((v) => positions.subarray(3 * v, 3 * v + 3));
+      const [u, v, w] = [b, c, d].map((p) => [0, 1, 2].map((i) => p[i] - a[i]));
+      const own = (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
+      volume += own;
+      integral += (own * corners.reduce((sum, v) => sum + offset + scale * field[v], 0)) / 4;
+    }
+    return { volume, mean: integral / volume };
+  });
+  const found = await near(wanted.volume, 2e-5);
+  const mean = Object.keys(found).find((name) => name.startsWith("Mean of "));
+  assert.ok(isNear(numberOf(found[mean]), wanted.mean), `${found[mean]}, ${wanted.mean}`);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a tetrahedron has the volume, the areas and the mean that it must have", async () => {
+  const page = await open(SMALL, undefined, COARSE);
+  await reach(page, "complete");
+  await drop(page, "tetrahedron.vtk", TETRAHEDRON);
+  const dialog = page.locator("dialog.build");
+  await dialog.getByRole("button", { name: "Build" }).click();
+  await page.waitForFunction(() => window.tetralodDemo.info?.tetrahedra === 1 && window.tetralodDemo.state === "complete", undefined, { timeout: PATIENCE });
+  await dialog.getByRole("button", { name: "Close" }).click();
+  // The address is written when the page rests.
+  await page.waitForFunction(() => location.hash.includes("tetrahedron.mt"), undefined, { timeout: PATIENCE });
+  await page.evaluate(() => (location.hash += "&view=iso&isovalue=1"));
+  await press(page, "n");
+  await settle(page);
+  const found = await measures(page);
+  // Its field is x + 2 y + 3 z, of which 1 is a triangle.
+  for (const [what, wanted] of /** @type {const} */ ([
+    ["Volume", 1 / 6],
+    ["Area of the boundary", (3 + Math.sqrt(3)) / 2],
+    ["Area of the isosurface", Math.sqrt(14) / 12],
+    ["Mean of p", 1.5],
+  ]))
+    assert.ok(isNear(numberOf(found[what]), wanted, 1e-3), `${what}: ${found[what]}, ${wanted}`);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
 test("a link to a file of the user asks for it, and shows it as in the link", async () => {
   const page = await open(SMALL, undefined, VIEWPORT);
   await reach(page, "complete");
@@ -860,7 +1540,7 @@ test("a link to a file of the user asks for it, and shows it as in the link", as
 });
 
 test("on a phone the card of a probe stays in the picture", async () => {
-  const page = await open(FLOW, undefined, { viewport: { width: 360, height: 640 }, hasTouch: true, isMobile: true });
+  const page = await open(FLOW, undefined, PHONE);
   await reach(page, "complete");
   await page.locator("label", { hasText: "Boundary" }).first().tap();
   await settle(page);
@@ -881,6 +1561,7 @@ test("on a phone the card of a probe stays in the picture", async () => {
     }
   }
   assert.ok(cards > 1, "there are probes");
+  assert.ok(await page.locator("#plot").evaluate(({ scrollWidth, clientWidth }) => scrollWidth <= clientWidth), "nothing of the plot is cut");
   await screenshot(page, "page-phone-probe");
   assert.deepEqual(page.complaints, []);
   await page.close();

@@ -37,8 +37,8 @@ async function complete(page) {
   await rest(page);
 }
 
-/** Waits until the state has been written. */
-const rest = (page) => page.waitForTimeout(400);
+/** Waits until the state has been written: by a timer of the page, which is due after that of the state, however slow the machine is. */
+const rest = (page) => page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 400)));
 
 /** What the page shows: its address, all controls, what is drawn and what is asked of the mesh. */
 const seen = (page) =>
@@ -125,12 +125,20 @@ const LINKS = [
   "#view=mesh&cut=10&shape=points&shrink=20&colour-by=block",
   "#view=volume&isovalue=4&log=1&range=percentiles&transfer=step",
   "#isovalue=7.5&inside=1&pixels=70&budget=80&region=box&focus=1&frame-time=95&refine=view&error=20&outside=11&box=0.1,0.2,0.3,1,2,3",
+  "#view=slice&time=1&probes=1,1,1&over-time=1",
+  "#view=solid&deform=velocity&times=-2.5&undeformed=1",
   "#view=solid&outline=0&shade=10&flip=0&region=cut&background=dark&axes=0&fly=1&probes=1,1,1,0.5,2,7&camera=1,1,1,5,0.2,0.3,orthographic",
 ];
 
-test("links of before are understood, and written as they were", async () => {
+/** Links with planes that are oblique, or several. */
+const PLANES = [
+  "#view=solid&cut=428.571&normal=1,1,0.5&flip=0",
+  "#view=slice&cut=100&other-cut=0&axis=0&planes=1,0,0,0,300,400,0,0,-1,1,1000,500&plane=3&handle=0",
+];
+
+test("links are understood, those of before, too, and written as they were", async () => {
   const page = await open();
-  for (const link of LINKS) {
+  for (const link of [...PLANES, ...LINKS]) {
     await page.evaluate((link) => (location.hash = link), link);
     await rest(page);
     assert.equal((await seen(page)).hash, link);
@@ -141,6 +149,145 @@ test("links of before are understood, and written as they were", async () => {
   assert.deepEqual(scene.boundary, { opacity: 1, edges: true });
   assert.deepEqual(scene.camera, { target: [1, 1, 1], distance: 5, yaw: 0.2, pitch: 0.3, projection: "orthographic" });
   assert.equal(await page.locator(".card").count(), 2);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("up to six planes are added, chosen and removed, and each has a normal and places of its own", async () => {
+  const page = await open("#view=solid");
+  const scene = (name) => page.evaluate((name) => window.tetralodDemo.viewer.state[name].map(({ normal, offset }) => [...normal, offset]), name);
+  await page.fill("#position", "1");
+  assert.equal(await page.inputValue("#cut"), "250");
+  await page.click("#add-plane");
+  await page.uncheck("#flip");
+  await page.fill("#cut", "750");
+  assert.deepEqual(await scene("clips"), [
+    [0, -1, 0, -1],
+    [1, 0, 0, 1.5],
+  ]);
+  await page.click("#add-plane");
+  await page.fill("#normal-y", "1");
+  assert.equal(await page.inputValue("#axis"), "");
+  const [x, y, z, offset] = (await scene("clips"))[2];
+  assert.ok(x === 0 && y === z && Math.abs(y + Math.SQRT1_2) < 1e-12 && Math.abs(offset + 6 / Math.SQRT2) < 1e-12, `${[x, y, z, offset]}`);
+  assert.deepEqual(await page.locator("#plane option").allInnerTexts(), ["1: y < 1", "2: x > 1.5", "3: n < 4.24"]);
+  // Sections have places of their own, and no side.
+  await page.check("[name=mode][value=slice]", { force: true });
+  assert.deepEqual(await page.locator("#plane option").allInnerTexts(), ["1: y = 2", "2: x = 1", "3: n = 4.24"]);
+  assert.equal((await scene("slices")).length, 3);
+  await page.check("[name=mode][value=solid]", { force: true });
+  // What is no direction, or outside of the model, is not taken.
+  await page.selectOption("#plane", "0");
+  const before = await scene("clips");
+  for (const [id, typed] of [
+    ["#normal-y", "0"],
+    ["#position", "4.5"],
+  ]) {
+    await page.fill(id, typed);
+    assert.ok(!(await page.locator(id).evaluate((input) => input.validity.valid)), id);
+  }
+  assert.deepEqual(await scene("clips"), before);
+  await page.locator("#cut").focus();
+  assert.equal(await page.inputValue("#position"), "1");
+  for (let i = 3; i < 6; i++) await page.click("#add-plane");
+  assert.ok(await page.isDisabled("#add-plane"));
+  // Each is refined where the region is that of the planes.
+  await page.selectOption("#region", "cut");
+  const request = await page.evaluate(() => window.tetralodDemo.request);
+  assert.deepEqual(
+    [request.slab, ...request.needs.map(({ slab }) => slab)].map(({ normal, offset }) => [...normal, offset]),
+    await scene("clips"),
+  );
+  for (let i = 6; i > 1; i--) await page.click("#remove-plane");
+  assert.ok(await page.isDisabled("#remove-plane"));
+  assert.deepEqual(await scene("clips"), [[0, -1, 0, -1]]);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("seeds lie on the chosen plane, where that is oblique, too, and another volume gets the planes at the same parts of its length", async () => {
+  const page = await open("#view=flow&cut=300&rake=5&normal=1,0,1&planes=0,0,1,1,500,250&plane=1");
+  const seeds = () => page.evaluate(() => window.tetralodDemo.viewer.state.streamlines.seeds);
+  const raked = await seeds();
+  assert.ok(raked.length > 5 && raked.length <= 25, `${raked.length}`);
+  for (const [x, y, z] of raked) assert.ok(x >= 0 && x <= 2 && y >= 0 && y <= 4 && z >= 0 && z <= 8 && Math.abs(x + z - 3) < 1e-9, `${[x, y, z]}`);
+  const canvas = await page.locator("#canvas").boundingBox();
+  await page.mouse.click(canvas.x + 0.3 * canvas.width, canvas.y + 0.25 * canvas.height);
+  const placed = (await seeds()).at(-1);
+  [0.6, 3, 2.4].forEach((at, i) => assert.ok(Math.abs(placed[i] - at) < 0.02, `${placed}`));
+  await page.selectOption("#plane", "1");
+  assert.ok((await seeds()).slice(0, -1).every(([, , z]) => z === 2));
+  await page.check("[name=mode][value=slice]", { force: true });
+  await page.click("#open-gallery");
+  await page.fill("#url", "plain.mt");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => window.tetralodDemo.info?.kind === "explicit", undefined, { timeout: PATIENCE });
+  await complete(page);
+  const slices = await page.evaluate(() => window.tetralodDemo.viewer.state.slices.map(({ normal, offset }) => [...normal, offset]));
+  assert.deepEqual(slices[1], [0, 0, -1, 0.5]);
+  assert.ok(Math.abs(slices[0][3] - 0.4 * Math.SQRT2) < 1e-12, `${slices[0]}`);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the handle of a plane moves and tilts it, by pointer and by keys, as one step each", async () => {
+  const page = await open("#view=solid");
+  const handle = (name) => page.locator(`#handles .${name}`);
+  const state = () => page.evaluate(() => window.tetralodDemo.viewer.state.clips[0]);
+  /** Drags it as far as that, in pixels. */
+  const drag = async (name, right, down) => {
+    const { x, y, width, height } = await handle(name).boundingBox();
+    const from = [x + width / 2, y + height / 2];
+    await page.mouse.move(from[0], from[1]);
+    await page.mouse.down();
+    await page.mouse.move(from[0] + right / 3, from[1] + down / 3);
+    await page.mouse.move(from[0] + right, from[1] + down);
+    await page.mouse.up();
+    await rest(page);
+  };
+  const { height } = await page.locator("#canvas").boundingBox();
+  const hashes = [await page.evaluate(() => location.hash)];
+  const step = async (act) => {
+    await act();
+    await rest(page);
+    hashes.push(await page.evaluate(() => location.hash));
+  };
+  // The arrow points to what is hidden, here down; the whole height of the picture is 4 units.
+  await step(() => drag("arrow", 20, height / 4));
+  const moved = await state();
+  assert.deepEqual(moved.normal, [0, -1, 0]);
+  assert.ok(Math.abs(moved.offset + 1) < 0.01, `${moved.offset}`);
+  assert.equal(await handle("arrow").getAttribute("aria-valuenow"), String(-moved.offset));
+  // By half the length of the arrow to the right: the ball, above the plane, goes along the circle around its middle.
+  await step(() => drag("ball", 32, 0));
+  const tilted = await state();
+  assert.ok(Math.abs(tilted.normal[0] / tilted.normal[1] - 0.5) < 0.01 && tilted.normal[2] === 0, `${tilted.normal}`);
+  // It turns around its middle.
+  const middle = tilted.normal[0] * 1 - tilted.normal[1] * moved.offset;
+  assert.ok(Math.abs(middle - tilted.offset) < 0.01, `${middle} is not ${tilted.offset}`);
+  await step(() => handle("arrow").press("ArrowRight"));
+  await step(() => handle("ball").press("ArrowUp"));
+  assert.ok((await state()).normal[2] !== 0);
+  assert.equal(new Set(hashes).size, hashes.length, `each is a step: ${hashes}`);
+  for (const hash of hashes.slice(0, -1).reverse()) {
+    await page.keyboard.press("Control+z");
+    await page.waitForFunction((hash) => location.hash === hash, hash, { timeout: PATIENCE });
+  }
+  // The wheel zooms over it as elsewhere.
+  const before = await page.evaluate(() => window.tetralodDemo.viewer.state.camera.distance);
+  await handle("arrow").hover();
+  await page.mouse.wheel(0, 100);
+  await page.waitForFunction((before) => window.tetralodDemo.viewer.state.camera.distance > before, before, { timeout: PATIENCE });
+  // A plane that cuts nothing has none, nor views without planes.
+  await page.fill("#cut", "0");
+  assert.ok(await page.locator("#handles").isHidden());
+  await page.fill("#cut", "10");
+  assert.ok(await page.locator("#handles").isVisible());
+  await page.uncheck("#handle");
+  assert.ok(await page.locator("#handles").isHidden());
+  await page.check("#handle");
+  await page.check("[name=mode][value=iso]", { force: true });
+  assert.ok(await page.locator("#handles").isHidden());
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { applyChanges, emptyMesh } from "../../pkg/changes.js";
-import { absolute, fieldsOf, withFields } from "../../pkg/stored.js";
+import { absolute, displaced, fieldsOf, withFields } from "../../pkg/stored.js";
 
 // By their addresses: the declarations beside them name types of libraries that are not here.
 const adapter = (name) => import(new URL(`../../pkg/${name}.js`, import.meta.url).href);
@@ -197,4 +197,23 @@ test("vtk.js gets absolute numbers in double precision", async () => {
   assert.deepEqual([...given.points], places);
   assert.deepEqual([...given.values], values);
   assert.equal(given.normals, triangle.normals);
+});
+
+test("a surface is displaced by three of its fields, in absolute numbers", () => {
+  const own = (name, index) => ({ index, name, unit: "", time: undefined, vector: undefined, offset: 0, scale: 1 });
+  const ways = [Float64Array.of(1, 2, 3), Float64Array.of(0, 0, 1), Float64Array.of(-1, 0, 0)];
+  const stored = withFields({ ...triangle, ...FAR }, ["x", "y", "z"].map(own), ways);
+  const known = (times) => places.map((x, i) => x + times * ways[i % 3][Math.floor(i / 3)]);
+  const moved = displaced(stored, ["x", "y", "z"], -2);
+  assert.deepEqual([...moved.positions], known(-2));
+  assert.deepEqual([moved.origin, moved.indices, "normals" in moved], [[0, 0, 0], triangle.indices, false]);
+  assert.deepEqual([...displaced(stored, [0, 1, 2], 0.5).positions], known(0.5));
+  for (const wrong of [
+    ["x", "y"],
+    ["x", "y", "w"],
+    [0, 1, 3],
+    ["x", "y", "z", "x"],
+  ]) {
+    assert.throws(() => displaced(stored, wrong, 1), { code: "bad-option" });
+  }
 });

@@ -283,7 +283,8 @@ test("the legend comes again with a volume that is opened again", async () => {
   const page = await opened();
   const legends = await page.evaluate(async () => {
     const { viewer } = window.tetralodDemo;
-    const next = () => new Promise((resolve) => viewer.addEventListener("legend", ({ detail }) => resolve(detail?.label), { once: true }));
+    // Before the base mesh is there, there may be a picture without one.
+    const next = () => new Promise((resolve) => viewer.addEventListener("legend", ({ detail }) => detail && resolve(detail.label)));
     const first = next();
     await viewer.set({ boundary: {} });
     const [label] = [await first];

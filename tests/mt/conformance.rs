@@ -197,7 +197,7 @@ impl<'a, M: ApplyUpdates + Clone> Walk<'a, M> {
         let before = mesh.hash();
         if undo {
             let (mut seen, fields): (Vec<Corners>, _) = (Vec::new(), mt.info().fields.len());
-            let looked = mt.look_at_removed(mesh, id, &mut |corners, levels, _| {
+            let looked = mt.look_at_removed(mesh, id, &mut |corners, levels, _, _| {
                 let levels: Vec<[i32; 4]> = (0..fields).map(levels).collect();
                 seen.push([0, 1, 2, 3].map(|i| (corners[i], levels.iter().map(|field| field[i]).collect())));
                 false

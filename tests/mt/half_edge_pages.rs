@@ -65,7 +65,7 @@ impl Paged {
                 let tet = explicit.tets()[t as usize].map(VertexId);
                 let corners = tet.map(|v| explicit.position(v));
                 let levels = |field: usize| tet.map(|v| explicit.levels(v)[field]);
-                let look = TetData { corners: &corners, levels: &levels, error, errors, update };
+                let look = TetData { corners: &corners, levels: &levels, error, errors, update, region: 0 };
                 criterion.judge(&look).violates()
             })
         };

@@ -84,7 +84,7 @@ fn asked(explicit: &ExplicitMt, criterion: &LodCriterion) -> Vec<bool> {
         let corners = tet.map(|v| explicit.position(v));
         let levels = |field: usize| tet.map(|v| explicit.levels(v)[field]);
         let (error, errors) = (explicit.error(u), explicit.errors(u));
-        let look = TetData { corners: &corners, levels: &levels, error, errors, update: u };
+        let look = TetData { corners: &corners, levels: &levels, error, errors, update: u, region: 0 };
         criterion.judge(&look).violates()
     };
     let updates = (0..explicit.updates()).map(UpdateId);
@@ -247,7 +247,8 @@ fn values_between_levels_are_not_missed() {
                     rounded_down += i32::from(field.value(level) < highest);
                     let reach = highest + errors[0].error() * field.range();
                     let levels = |field: usize| tet.map(|v| explicit.levels(v)[field]);
-                    let look = TetData { corners: &corners, levels: &levels, error, errors, update: u };
+                    let look =
+                        TetData { corners: &corners, levels: &levels, error, errors, update: u, region: 0 };
                     let judged = |low: f64| {
                         let need = Need::within(0.0).between(0, vec![[low, f64::MAX]]);
                         LodCriterion::new(info, &need.into()).judge(&look).violates()

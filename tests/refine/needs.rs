@@ -288,7 +288,7 @@ proptest! {
         let level = |f: usize| levels.map(|x| (x * f64::from((1 << info.fields[f].bits) - 1)) as i32);
         let error = ErrorCode::at_least(error * error);
         let errors = &[error; 3];
-        let look = TetData { corners: &corners, levels: &level, error, errors, update: UpdateId(3) };
+        let look = TetData { corners: &corners, levels: &level, error, errors, update: UpdateId(3), region: 0 };
         let [old, new] = [&before, &after].map(|criterion| criterion.judge(&look));
         let distance = after.component_distance(&before, old.component);
         prop_assert!(distance <= after.distance(&before));

@@ -69,7 +69,7 @@ impl Subject {
         let tet = self.explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| self.explicit.position(v));
         let levels = |field: usize| tet.map(|v| self.explicit.levels(v)[field]);
-        let look = TetData { corners: &corners, levels: &levels, error, errors: &errors, update };
+        let look = TetData { corners: &corners, levels: &levels, error, errors: &errors, update, region: 0 };
         criterion.judge(&look).violates().then_some(update.0)
     }
 

@@ -4,6 +4,7 @@ use crate::support::meshes::{cube, hilly, linear};
 use crate::support::requests::requests;
 use std::ops::Range;
 use tetralod::format::{EncodeOptions, encode};
+use tetralod::mesh::NONE;
 use tetralod::mt::{Mt, MtKind};
 use tetralod::session::Session;
 use tetralod_build::{BuildConfig, build};
@@ -47,6 +48,24 @@ impl Copy {
     }
 }
 
+/// What is shown are the tetrahedra within a range, and they are neighbours of each other alone.
+fn assert_shown(session: &mut Session, within: Option<(usize, [f64; 2])>) {
+    let values = within.map(|(field, _)| session.values(field)).unwrap_or_default();
+    let mesh = session.mesh().expect("it is open");
+    let is_within = |tet: &[u32; 4]| {
+        within.is_none_or(|(_, [low, high])| tet.iter().all(|&v| (low..=high).contains(&values[v as usize])))
+    };
+    let is_shown: Vec<bool> = mesh.tets().iter().map(|tet| tet[0] != NONE && is_within(tet)).collect();
+    let (tets, neighbors) = (mesh.tets().to_vec(), mesh.neighbors().to_vec());
+    let shown = |is_shown: bool, all: [u32; 4]| if is_shown { all } else { [NONE; 4] };
+    let view = session.view();
+    for (t, &is_here) in is_shown.iter().enumerate() {
+        assert_eq!(view.tets[t], shown(is_here, tets[t]));
+        let across = neighbors[t].map(|n| if n != NONE && is_shown[n as usize] { n } else { NONE });
+        assert_eq!(view.neighbors[t], shown(is_here, across), "the neighbours of {t}");
+    }
+}
+
 fn opened(mt: &Mt) -> Session {
     let mut session = Session::new();
     session.feed(&encode(mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
@@ -60,7 +79,7 @@ fn copies_follow_a_walk_of_requests_and_steps() {
         let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
         let built = build(&mesh, &config);
         let mut session = opened(&built.expect("a valid mesh").mt);
-        let mut copy = Copy::default();
+        let (mut copy, mut within) = (Copy::default(), None);
         for i in 0_usize..60 {
             let request = &requests()[i * i % 7];
             session.request(request).expect("a good request");
@@ -85,7 +104,12 @@ fn copies_follow_a_walk_of_requests_and_steps() {
             if i % 7 == 2 {
                 session.set_field(i % 2).expect("there are two");
             }
+            if i % 12 == 3 || i % 12 == 9 {
+                within = (i % 12 == 3).then_some((i / 12 % 2, [0.2, 0.6]));
+                session.show_within(within);
+            }
             if i % 5 < 3 {
+                assert_shown(&mut session, within);
                 copy.catch_up(&mut session);
             }
         }

@@ -4,6 +4,7 @@ mod bench;
 mod changes;
 mod client;
 mod curve;
+mod deformation;
 mod hostile;
 mod kinds;
 mod network;

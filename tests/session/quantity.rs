@@ -55,6 +55,15 @@ fn nothing_is_said_before_there_is_a_mesh() {
 }
 
 #[test]
+fn without_regions_all_tetrahedra_are_of_the_first() {
+    for kind in MtKind::ALL {
+        let mut session = opened(kind);
+        let regions = of(&mut session, TetQuantity::Region);
+        assert!(regions.len() == session.view().tets.len() && regions.iter().all(|r| *r == 0.0));
+    }
+}
+
+#[test]
 fn sizes_are_longest_edges_and_errors_are_within_the_request() {
     for kind in MtKind::ALL {
         let mut session = opened(kind);

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use tetralod::format::{DecodeOptions, Decoder, EncodeError, EncodeOptions, FormatError, Limits, encode};
 use tetralod::geom::Lattice;
-use tetralod::mesh::VectorPart;
+use tetralod::mesh::{Averaged, Difference, Extreme, Extremes, VectorPart};
 use tetralod::mt::{
     Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, FieldInfo,
     Mt, MtInfo, MtKind, MultiTessellation, UpdateId, VertexId, VertexSplit,
@@ -25,14 +25,34 @@ pub fn field(name: &str, bits: u32) -> FieldInfo {
     }
 }
 
+/// Extremes at points, or at this cell and one beside it in a part of its own.
+fn extremes(cell: Option<u32>) -> Extremes {
+    let min = Extreme { value: -1.0, place: [0.5, -2.0, 1e-9], cell, part: None };
+    let part = cell.map(|_| "Stück 2".to_owned());
+    let max = Extreme { value: 3.25, place: [0.0, 1e7, -0.125], cell: cell.map(|cell| cell + 300), part };
+    Extremes { min, max }
+}
+
 /// A field that tells all there is, or a part of it, or no more than it must.
 fn told_more(number: usize, bits: u32) -> FieldInfo {
     let field = field(["pressure", "Dichte ρ", "", "w"][number % 4], bits);
     let vector = |component| Some(VectorPart { name: "U".into(), component });
     match number {
         0 => field,
-        1 => FieldInfo { unit: "m/s".into(), vector: vector(Some(1)), ..field },
-        2 => FieldInfo { time: Some(-2.5), vector: vector(None), quantization: 0.25, ..field },
+        1 => FieldInfo {
+            unit: "m/s".into(),
+            vector: vector(Some(1)),
+            extremes: Some(extremes(None)),
+            averaged: Some(Averaged {
+                input: extremes(Some(7)),
+                difference: Difference { rms: 0.125, largest: 3.5 },
+            }),
+            ..field
+        },
+        2 => {
+            let extremes = Some(extremes(None));
+            FieldInfo { time: Some(-2.5), vector: vector(None), quantization: 0.25, extremes, ..field }
+        }
         _ => FieldInfo { time: Some(0.0), ..field },
     }
 }

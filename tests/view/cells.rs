@@ -188,16 +188,24 @@ fn wires_run_along_the_edges() {
 #[test]
 fn points_are_discs_at_the_points() {
     let mut renderer = twin::renderer(SIZE);
-    let scene = Scene::ball(2);
+    let mut scene = Scene::ball(2);
+    let count = scene.positions.len();
+    // The place of one that is not there any more.
+    scene.positions.push([0.3, 0.2, 0.7]);
+    scene.field.push(0.0);
     let look = Look { pixel_ratio: 2.0, ..twin::plain() };
-    let style = CellStyle { shape: CellShape::Points(4.0), ..solid(0.0) };
-    let Colouring::Scale(scale) = style.style.colouring else { panic!("they have a scale") };
-    for camera in cameras() {
+    let own: Vec<f64> = (0..scene.tets.len()).map(|t| (t % 17) as f64 / 10.0 - 0.75).collect();
+    let first = |p: usize| scene.tets.iter().position(|tet| tet.contains(&(p as u32))).expect("it has some");
+    for (camera, own_values) in cameras().into_iter().flat_map(|camera| [(camera, false), (camera, true)]) {
+        let style = CellStyle { shape: CellShape::Points(4.0), own_values, ..solid(0.0) };
+        let Colouring::Scale(scale) = style.style.colouring else { panic!("they have a scale") };
+        renderer.set_cell_values(&own).unwrap();
         renderer.set_cells(Some(&style));
         renderer.update_mesh(&scene.view(), None).unwrap();
         let pixels = twin::picture(&mut renderer, &camera, &look);
         twin::save(&format!("points-{:?}", camera.projection()), SIZE, &pixels);
-        let at: Vec<_> = scene.positions.iter().map(|p| place(&camera, twin::vec(*p))).collect();
+        let there = &scene.positions[..count];
+        let at: Vec<_> = there.iter().map(|p| place(&camera, twin::vec(*p))).collect();
         for (i, middle) in middles() {
             // Four units of two pixels are the diameter.
             let nearest = at.iter().map(|p| p.distance(middle)).fold(f64::INFINITY, f64::min);
@@ -214,7 +222,8 @@ fn points_are_discs_at_the_points() {
             if is_inside && !(0..at.len()).any(hides) {
                 nearest += 1;
                 let pixel = pixels[middle.y as usize * SIZE[0] as usize + middle.x as usize];
-                let colour = twin::vec(scale.colour(scene.field[p])).map(twin::decode);
+                let value = if own_values { own[first(p)] } else { scene.field[p] };
+                let colour = twin::vec(scale.colour(value)).map(twin::decode);
                 let bright = (1.2 * colour).map(twin::encode);
                 assert!((DVec3::from(pixel) - bright).abs().max_element() < 0.06, "point {p}: {pixel:?}");
             }

@@ -6,6 +6,7 @@ mod colour_error;
 mod compare;
 mod cutaway;
 mod data_sets;
+mod deform;
 mod difference;
 mod far;
 mod far_pictures;

@@ -6,14 +6,16 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::LazyLock;
 use tetralod::format::{EncodeOptions, encode};
+use tetralod::mesh::Field;
 use tetralod::mt::Mt;
 use tetralod::refine::Request;
 use tetralod::session::Session;
-use tetralod::view::Triangles;
-use tetralod_render::draw::{BoxLines, CellStyle, Edit, Style};
+use tetralod::view::{Triangles, region_color};
+use tetralod_build::{BuildConfig, build};
+use tetralod_render::draw::{BoxLines, CellStyle, Colouring, Edit, Style};
 use tetralod_render::scene::{
-    BoundaryState, CellState, CompareState, IsosurfaceState, PlaneState, Scene, SceneError, SceneState,
-    SliceState, Update, VolumeState,
+    BoundaryState, CellState, ColourBy, ColourState, CompareState, IsosurfaceState, PlaneState, RegionName,
+    Scene, SceneError, SceneState, SliceState, ThresholdState, Update, VolumeState,
 };
 
 /// A surface as it is drawn.
@@ -84,7 +86,8 @@ impl Drawn {
                     self.beside.get_or_insert_default().apply(edits)
                 }
                 Edit::Beside { .. } => self.beside = None,
-                Edit::Points(_) | Edit::Values(_) | Edit::CellValues(_) | Edit::Mesh(..) => {}
+                Edit::Points(_) | Edit::Values(_) | Edit::CellValues(_) | Edit::Mesh(..) | Edit::Moves(_) => {
+                }
             }
         }
     }
@@ -144,7 +147,7 @@ fn slice(field: Option<&str>) -> SliceState {
     }
 }
 
-fn states() -> [SceneState; 3] {
+fn states() -> [SceneState; 4] {
     let surface = |opacity: f64| IsosurfaceState { opacity, ..IsosurfaceState::default() };
     let coloured = IsosurfaceState { field: Some("f1".to_owned()), ..IsosurfaceState::default() };
     [
@@ -161,6 +164,13 @@ fn states() -> [SceneState; 3] {
             ..SceneState::default()
         },
         SceneState { cells: Some(CellState::default()), outline: false, ..SceneState::default() },
+        SceneState {
+            threshold: Some(ThresholdState { field: Some("f1".to_owned()), range: [0.1, 0.6] }),
+            isosurfaces: vec![surface(1.0)],
+            boundary: Some(BoundaryState::default()),
+            colours: ColourState { bands: Some(5), ..ColourState::default() },
+            ..SceneState::default()
+        },
     ]
 }
 
@@ -209,7 +219,7 @@ fn only_changes_come_while_the_state_stays() {
 
 #[test]
 fn a_mesh_that_was_kept_is_listed_beside() {
-    let [_, state, _] = states();
+    let [_, state, ..] = states();
     let (mut scene, mut session, mut drawn) = (scene(&state), opened(), Drawn::default());
     session.refine(&Request::within(0.3)).expect("a good request");
     drawn.apply(&[scene.keep(&mut session).expect("it is there")]);
@@ -226,7 +236,7 @@ fn a_mesh_that_was_kept_is_listed_beside() {
 
 #[test]
 fn what_comes_before_an_error_is_listed() {
-    let [_, state, _] = states();
+    let [_, state, ..] = states();
     let slices = vec![slice(None), slice(Some("no such"))];
     let (mut scene, mut session) = (scene(&SceneState { slices, ..state }), opened());
     let Update { edits, changed } = scene.update(&mut session);
@@ -234,4 +244,126 @@ fn what_comes_before_an_error_is_listed() {
     let mut drawn = Drawn::default();
     drawn.apply(&edits);
     assert_eq!(drawn.surfaces.len(), 2, "the isosurface and the first slice");
+}
+
+/// Two halves and a core that reaches into both, each a region.
+fn in_regions() -> Session {
+    let mut mesh = cube(6, &[hilly, linear]);
+    let middle = |tet: &[u32; 4]| {
+        let corners = tet.map(|v| mesh.positions[v as usize]);
+        [0, 1, 2].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / 4.0)
+    };
+    let label = |[x, y, z]: [f64; 3]| match [x, y, z].iter().all(|c| (c - 0.5).abs() < 0.17) {
+        true => 5.0,
+        false => f64::from(u8::from(x > 0.5)),
+    };
+    let labels = mesh.tets.iter().map(|tet| label(middle(tet))).collect();
+    mesh.cell_fields = vec![Field::new("part", labels)];
+    let config = BuildConfig { preserve: vec!["part".into()], all_fields: true, ..BuildConfig::default() };
+    let mt = build(&mesh, &config).expect("a valid mesh").mt;
+    let mut session = Session::new();
+    session.feed(&encode(&mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
+    session
+}
+
+#[test]
+fn regions_that_are_not_shown_are_not_drawn() {
+    let all = SceneState {
+        boundary: Some(BoundaryState::default()),
+        isosurfaces: vec![IsosurfaceState { value: Some(0.4), ..IsosurfaceState::default() }],
+        slices: vec![SliceState {
+            normal: [0.0, 1.0, 0.0],
+            offset: 0.45,
+            opacity: 1.0,
+            edges: false,
+            field: None,
+            clipped: true,
+        }],
+        ..SceneState::default()
+    };
+    let mut session = in_regions();
+    session.refine(&Request::within(0.0)).expect("a valid MT");
+    let (mut list, mut drawn) = (scene(&all), Drawn::default());
+    follow(&mut list, &mut session, &mut drawn);
+    let whole = drawn.clone();
+    for (names, inside) in [
+        (vec![RegionName::Label(0)], [0.0, 0.5]),
+        (vec![RegionName::Name("1".into())], [0.5, 1.0]),
+        (vec![RegionName::Label(5)], [1.0 / 3.0, 2.0 / 3.0]),
+    ] {
+        list.set_state(SceneState { regions: Some(names.clone()), ..all.clone() }).expect("a good state");
+        follow(&mut list, &mut session, &mut drawn);
+        let points = || drawn.surfaces.values().flat_map(|surface| &surface.positions);
+        assert!(points().count() > 0, "{names:?}");
+        let off = points().find(|p| !(inside[0] - 1e-6..=inside[1] + 1e-6).contains(&p[0]));
+        assert_eq!(off, None, "{names:?}");
+        // As it is from nothing.
+        let (mut other, mut again) = (in_regions(), Drawn::default());
+        other.refine(&Request::within(0.0)).expect("a valid MT");
+        follow(&mut scene(list.state()), &mut other, &mut again);
+        drawn.assert_same(&again);
+    }
+    list.set_state(all).expect("a good state");
+    follow(&mut list, &mut session, &mut drawn);
+    drawn.assert_same(&whole);
+    let unknown =
+        SceneState { regions: Some(vec![RegionName::Name("rotor".into())]), ..list.state().clone() };
+    list.set_state(unknown).expect("whether it is there depends on the volume");
+    let problem = list.update(&mut session).changed.expect_err("there is no rotor").to_string();
+    assert!(problem.contains("regions[0]") && problem.contains("0, 1, 5"), "{problem}");
+}
+
+#[test]
+fn each_region_has_a_colour_of_its_own() {
+    let boundary = BoundaryState { colour_by: ColourBy::Region, ..BoundaryState::default() };
+    let state = SceneState { boundary: Some(boundary.clone()), ..SceneState::default() };
+    let mut session = in_regions();
+    session.refine(&Request::within(0.01)).expect("a valid MT");
+    let drawn_of = |state: &SceneState, session: &mut Session| {
+        let mut drawn = Drawn::default();
+        follow(&mut scene(state), session, &mut drawn);
+        drawn.surfaces.retain(|_, surface| !surface.triangles.is_empty());
+        drawn
+    };
+    let by_region = drawn_of(&state, &mut session);
+    // The core is inside.
+    assert_eq!(by_region.surfaces.len(), 2);
+    for surface in by_region.surfaces.values() {
+        let low = surface.positions.iter().all(|p| p[0] <= 0.5);
+        assert!(low || surface.positions.iter().all(|p| p[0] >= 0.5), "a colour is of one half");
+    }
+    let by_field = BoundaryState { colour_by: ColourBy::Field, ..boundary };
+    let plain = drawn_of(&SceneState { boundary: Some(by_field), ..SceneState::default() }, &mut session);
+    let triangles =
+        |drawn: &Drawn| drawn.surfaces.values().map(|surface| surface.triangles.len()).sum::<usize>();
+    assert_eq!(triangles(&by_region), triangles(&plain));
+    // Of tetrahedra, each has the colour of its region, too.
+    let cells = CellState { colour_by: "region".to_owned(), ..CellState::default() };
+    let by_cell = SceneState { cells: Some(cells), ..SceneState::default() };
+    let (regions, colors) = {
+        let all = session.regions().expect("it has regions").colors();
+        (session.mesh().expect("it is open").regions().to_vec(), all)
+    };
+    let mut list = scene(&by_cell);
+    let edits = list.update(&mut session).edits;
+    let values =
+        edits.iter().find_map(|edit| if let Edit::CellValues(values) = edit { Some(*values) } else { None });
+    let values = values.expect("a value for each tetrahedron").to_vec();
+    let style = edits.iter().find_map(|edit| if let Edit::Cells(style) = edit { *style } else { None });
+    let Some(Colouring::Scale(scale)) = style.map(|style| style.style.colouring) else { panic!("a scale") };
+    assert_eq!(values.len(), regions.len());
+    for (value, region) in values.iter().zip(&regions) {
+        let bytes = scale.colour(*value).map(|c| (c * 255.0).round() as u8);
+        assert_eq!(bytes, region_color(colors[usize::from(*region)]));
+    }
+    drop(edits);
+    assert!(list.legend().is_none(), "the colours mean no values");
+    // Without regions it is the field.
+    let mut list = scene(&by_cell);
+    follow(&mut list, &mut opened(), &mut Drawn::default());
+    assert_eq!(list.legend().map(|legend| legend.label.as_str()), Some("f0"));
+    let (mut list, mut session) = (scene(&state), opened());
+    let mut drawn = Drawn::default();
+    follow(&mut list, &mut session, &mut drawn);
+    assert_eq!((drawn.surfaces.len(), list.legend().is_some()), (1, true));
 }

@@ -44,6 +44,7 @@ fn the_frame_has_the_layout_that_its_twin_has() {
             "depth",
             "sky",
             "ground",
+            "moved",
             "clips",
         ];
         // A matrix of four vectors, then a vector each.
@@ -52,7 +53,7 @@ fn the_frame_has_the_layout_that_its_twin_has() {
         let expected: Vec<_> = expected.collect();
         let expected: Vec<_> = expected.iter().map(|(name, offset)| ((*name).to_owned(), *offset)).collect();
         assert_eq!(places, expected, "{name}");
-        assert_eq!(*span, 544, "{name}");
+        assert_eq!(*span, 560, "{name}");
     }
 }
 

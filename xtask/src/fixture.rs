@@ -58,7 +58,7 @@ fn stamp(tetralod: &Path) -> Result<String> {
     Ok(format!("{} bytes of {}", about.len(), time.as_nanos()))
 }
 
-/// Makes `blocks-half-edge.mt`, a file of hundreds of blocks, and `fields.mt`, one of two fields.
+/// Makes `blocks-half-edge.mt`, a file of hundreds of blocks, `fields.mt`, one of two fields, and `parts.mt`, one of twelve regions.
 fn make_blocks(tetralod: &Path, folder: &Path) -> Result<()> {
     for (name, data, size, extension) in
         [("blocks-half-edge", "bucky", "33", "vti"), ("fields", "sphere-flow", "14", "vtu")]
@@ -68,7 +68,10 @@ fn make_blocks(tetralod: &Path, folder: &Path) -> Result<()> {
         let build = ["build", "--quiet", "--all-fields", "--block-updates", "64", "-o"];
         shell::run(shell::command(tetralod, build).arg(mt).arg(mesh))?;
     }
-    Ok(())
+    let [mesh, mt] = ["vtu", "mt"].map(|extension| folder.join(format!("parts.{extension}")));
+    shell::run(shell::command(tetralod, ["generate", "turbine", "--size", "9", "-o"]).arg(&mesh))?;
+    let build = ["build", "--quiet", "--all-fields", "--preserve", "part", "--block-updates", "64", "-o"];
+    shell::run(shell::command(tetralod, build).arg(mt).arg(mesh))
 }
 
 /// Builds an MT and tells the hashes of its meshes.

@@ -18,7 +18,7 @@ const LIST: &str = "tests/public-api.txt";
 const LIBRARIES: [&str; 4] = ["tetralod", "tetralod-io", "tetralod-build", "tetralod-render"];
 
 /// As many names as a user of the library should have to know of, at most.
-const MOST_NAMES: usize = 150;
+const MOST_NAMES: usize = 155;
 
 /// Compares the list with the sources; with `TETRALOD_UPDATE_API` set, writes it.
 pub fn check() -> Result<()> {

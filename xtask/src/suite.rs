@@ -283,6 +283,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("writers.test.js"))?;
     shell::run(&mut node_test("tools.test.js"))?;
     shell::run(&mut node_test("bins.test.js"))?;
+    shell::run(&mut node_test("geometry.test.js"))?;
     shell::run(&mut node_test("policy.test.js"))?;
     with_fixture(|| {
         for name in [
@@ -292,6 +293,7 @@ fn js() -> Result<()> {
             "steps.test.js",
             "places.test.js",
             "views.test.js",
+            "regions.test.js",
         ] {
             shell::run(fixture_env(&mut node_test(name)))?;
         }
@@ -308,7 +310,7 @@ fn node_tool(path: &str, args: &[&str]) -> Command {
 fn node_test(file: &str) -> Command {
     let file = format!("tests/js/{file}");
     let mut command =
-        shell::command("node", ["--test", "--test-reporter=spec", "--test-timeout=900000", &file]);
+        shell::command("node", ["--test", "--test-reporter=spec", "--test-timeout=2700000", &file]);
     // It would take the place of Chromium.
     command.env_remove("FIREFOX");
     command

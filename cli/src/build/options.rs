@@ -50,14 +50,15 @@ pub struct BuildOptions {
     /// tetrahedra, but every one is answered from the base mesh. With --method insert only.
     #[arg(long)]
     tet_errors: bool,
-    /// A field to keep (repeatable, in this order), or a vector with all its components; if not given, the first that does not number
-    /// something or say where it is, such as material or coordinates. Where the input has none of these names: distance (from the middle of the bounding box), x, y, z, or none, for the shape alone.
+    /// A field to keep (repeatable, in this order), or a vector with all its components; if not given, the first array that does not
+    /// number something or say where it is, such as material or coordinates: of a vector the magnitude, of a symmetric tensor von Mises' equivalent. Where the input has none of these names: distance (from the middle of the bounding box), x, y, z, or none, for the shape alone.
     #[arg(long = "field", value_name = "NAME")]
     fields: Vec<String>,
-    /// Keep all fields but the lengths of vectors.
+    /// Keep all fields but what follows from others: magnitudes of vectors, von Mises' equivalent and principal values of symmetric tensors.
     #[arg(long)]
     all_fields: bool,
-    /// Turn fields at cells into fields at points: the mean of the cells around, weighted by volume.
+    /// Turn fields at cells into fields at points: the mean of the cells around, weighted by volume. What that does to each field is said,
+    /// and kept in the file.
     #[arg(long)]
     pub(super) cell_to_point: bool,
     #[command(flatten)]

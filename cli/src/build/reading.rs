@@ -55,13 +55,7 @@ impl BuildOptions {
         input::expect_format(&self.inputs, self.format.as_deref());
         let source = input::Source { format: self.format.as_deref(), step: self.step, memory };
         let (mut mesh, repaired) = input::read_cells(&self.inputs, &wanted, level, source, alone)?;
-        let is_label = |field: &&Field| config.preserve.contains(&field.name);
-        let labels: Vec<Field> = mesh.cell_fields.iter().filter(is_label).cloned().collect();
-        match self.cell_to_point {
-            true => mesh.cells_to_points(),
-            false => mesh.cell_fields.iter_mut().for_each(|field| field.values = Vec::new()),
-        }
-        mesh.cell_fields.extend(labels);
+        mesh.settle_cells(self.cell_to_point, &config.preserve);
         mesh.add_geometry_fields(&config.fields);
         if config.construction.method().keeps_the_mesh() {
             input::expect_cells(&mesh, &self.inputs[0])?;

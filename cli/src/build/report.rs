@@ -1,10 +1,11 @@
 //! What `tetralod build` says of the file that it has written.
 
-use crate::output;
 use crate::repair::Repair;
 use crate::restrictions::Angles;
+use crate::{extremes, output};
 use serde::Serialize;
 use std::path::Path;
+use tetralod::mt::AveragedField;
 use tetralod_build::BuildSummary;
 
 /// The summary as programs get it.
@@ -16,6 +17,9 @@ pub(super) struct Report {
     pub criterion: Option<&'static str>,
     #[serde(flatten)]
     pub counts: BuildSummary,
+    /// How many regions the file has, if arrays were to be kept apart: 0 in a file of a kind that has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub regions: Option<usize>,
     /// How far interfaces between regions have moved, in model units, if they may.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_deviation: Option<f64>,
@@ -29,6 +33,12 @@ pub(super) struct Report {
     /// With a bound for them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angles: Option<Angles>,
+    /// What averaging has done to the fields that the input has at cells.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub averaged: Vec<AveragedField>,
+    /// The diagonal of the domain, for people.
+    #[serde(skip)]
+    pub size: f64,
     /// What the reader left out of the input or changed, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
@@ -42,6 +52,14 @@ pub fn rows_of(counts: &BuildSummary) -> [(&'static str, String); 3] {
         ("base mesh", output::mesh(base_vertices, base_tetrahedra)),
         ("updates", format!("{}, at most {} deep", output::count(updates), output::count(depth))),
     ]
+}
+
+/// How many regions a file has.
+fn said(regions: usize) -> String {
+    match regions {
+        0 => "none in the file: only kind half-edge has them; their interfaces are kept".to_owned(),
+        _ => output::count(regions as u32),
+    }
 }
 
 pub(super) fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
@@ -62,10 +80,12 @@ pub(super) fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)
             ),
         ),
     ]);
+    rows.extend(report.regions.map(|count| ("regions", said(count))));
     let moved = report
         .interface_deviation
         .map(|moved| ("interfaces moved", format!("{} at most", output::number(moved))));
     rows.extend(moved);
     rows.extend(report.angles.iter().flat_map(Angles::rows));
+    rows.extend(extremes::rows(&report.averaged, report.size));
     rows
 }

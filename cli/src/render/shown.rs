@@ -1,5 +1,6 @@
 //! What a picture shows: the options that say so, and the scene that they make.
 
+use crate::deform::Deform;
 use crate::needs::read_json;
 use crate::output;
 use crate::parse::{one_of, parse_bounds, parse_list, parse_number, parse_plane, parse_range, parse_share};
@@ -11,10 +12,11 @@ use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
 use tetralod::geom::Bounds;
 use tetralod::mt::FieldInfo;
-use tetralod::session::TetQuantity;
+use tetralod::session::{Deformation, Session, TetQuantity};
 use tetralod::view::Plane;
 use tetralod_render::scene::{
-    Background, CellKind, IsosurfaceState, MapName, PlaneState, SceneState, SliceState,
+    Background, CellKind, ColourBy, DeformState, IsosurfaceState, MapName, PlaneState, RegionName,
+    SceneState, SliceState, ThresholdState,
 };
 
 const SHOWN: &str = "What is shown";
@@ -44,7 +46,7 @@ pub struct Shown {
     /// the colours].
     #[arg(long, value_name = "v,o,v,o,…", value_parser = parse_opacities, allow_hyphen_values = true)]
     opacities: Option<Opacities>,
-    /// What colours tetrahedra: the field, or a property of each.
+    /// What colours tetrahedra: the field, or a property of each; with `region`, the boundary, too, by the regions that the file keeps.
     #[arg(long, value_name = "WHAT", value_parser = quantities())]
     colour_by: Option<String>,
     /// Shrink each tetrahedron by this part of its size, 0 to 0.95 or with %.
@@ -59,6 +61,17 @@ pub struct Shown {
     /// Cut away all outside of this box.
     #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = parse_bounds, allow_hyphen_values = true)]
     clip_box: Option<Bounds>,
+    /// Show those tetrahedra alone whose four values are within this range, in units of the field; the boundary is theirs.
+    #[arg(long, value_name = "a,b", value_parser = parse_range, allow_hyphen_values = true)]
+    threshold: Option<[f64; 2]>,
+    /// The field of --threshold [default: that of --field].
+    #[arg(long, value_name = "NAME", requires = "threshold")]
+    threshold_field: Option<String>,
+    #[command(flatten)]
+    deform: Deform,
+    /// With --deform, draw the boundary as it is without displacement, too, so that one sees through it.
+    #[arg(long, requires = "deform", help_heading = "Deformed shape")]
+    undeformed: bool,
     /// Draw the edges of triangles and of the tetrahedra that are cut; those of tetrahedra are drawn anyway.
     #[arg(long)]
     edges: bool,
@@ -89,6 +102,9 @@ pub struct Shown {
     /// Colours run backwards.
     #[arg(long, help_heading = COLOURS)]
     reversed: bool,
+    /// So many colours, 2 to 64, each for an equal part of the range [default: colours run into one another].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64), help_heading = COLOURS)]
+    bands: Option<u8>,
     /// What is behind everything [default: dark].
     #[arg(long, value_name = "WHAT", value_parser = one_of(GROUNDS), help_heading = COLOURS)]
     background: Option<Background>,
@@ -183,13 +199,27 @@ impl Shown {
         }
     }
 
+    /// Refuses what displaces or colours if it has no step at the time that is asked for.
+    pub fn check_steps(&self, query: &Query, session: &Session, by: Option<&Deformation>) -> Result<()> {
+        let (Some(info), shown) = (session.info(), session.field()) else { return Ok(()) };
+        let colours = self.colour_field.as_ref().and_then(|name| info.step_of(name, shown));
+        let others = colours.into_iter().chain(by.map(|by| by.fields[0]));
+        others.into_iter().try_for_each(|other| query.check_step(info, shown, other))
+    }
+
+    /// Whether regions give the boundary its colours.
+    fn is_by_region(&self) -> bool {
+        self.colour_by.as_deref() == Some("region")
+    }
+
     /// What to add: the modes, or those that other options are for.
     fn wanted(&self, query: &Query, is_box: bool) -> Vec<Mode> {
         if !self.modes.is_empty() {
             return self.modes.clone();
         }
         // Those of a scene stay as they are.
-        let has_cells = self.colour_by.is_some() || self.shrink.is_some() || self.cut.is_some();
+        let by_cell = self.colour_by.is_some() && !self.is_by_region();
+        let has_cells = by_cell || self.shrink.is_some() || self.cut.is_some();
         let is_coloured = self.colour_field.is_some() && self.slices.is_empty();
         let is_new = self.scene.is_none() && (!query.isovalues().is_empty() || is_coloured);
         let has_surface = !self.surfaces.is_empty() || is_new;
@@ -197,6 +227,7 @@ impl Shown {
             (Mode::Isosurface, has_surface),
             (Mode::Slice, !self.slices.is_empty()),
             (Mode::Volume, self.opacities.is_some()),
+            (Mode::Boundary, self.is_by_region()),
             (Mode::Cells, has_cells && self.scene.is_none()),
         ];
         let wanted: Vec<Mode> = implied.into_iter().filter(|(_, is)| *is).map(|(mode, _)| mode).collect();
@@ -220,6 +251,8 @@ impl Shown {
         }
         self.refuse_idle(&state);
         self.adjust(&mut state);
+        let named = |names: Vec<String>| names.into_iter().map(RegionName::Name).collect();
+        state.regions = query.shown_regions().map(named).or(state.regions);
         Ok(state)
     }
 
@@ -273,7 +306,16 @@ impl Shown {
             ("isovalue", !self.surfaces.is_empty() && state.isosurfaces.is_empty(), "isosurface"),
             ("slice", !self.slices.is_empty() && state.slices.is_empty(), "slice"),
             ("opacities", self.opacities.is_some() && state.volume.is_none(), "volume"),
-            ("colour-by", self.colour_by.is_some() && state.cells.is_none(), "cells, wire or points"),
+            (
+                "colour-by region",
+                self.is_by_region() && state.boundary.is_none() && state.cells.is_none(),
+                "boundary, cells, wire or points",
+            ),
+            (
+                "colour-by",
+                self.colour_by.is_some() && !self.is_by_region() && state.cells.is_none(),
+                "cells, wire or points",
+            ),
             ("shrink", self.shrink.is_some() && state.cells.is_none(), "cells"),
             ("cut", self.cut.is_some() && state.cells.is_none(), "cells, wire or points"),
             ("opacity", self.opacity.is_some() && !faces, "isosurface, slice or boundary"),
@@ -308,11 +350,21 @@ impl Shown {
                 cells.colour_by.clone_from(what);
             }
         }
+        if let (Some(boundary), true) = (&mut state.boundary, self.is_by_region()) {
+            boundary.colour_by = ColourBy::Region;
+        }
         if !self.clips.is_empty() {
             state.clips = self.clips.iter().map(plane).collect();
         }
         if let Some(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] }) = self.clip_box {
             state.clip_box = Some([x0, y0, z0, x1, y1, z1]);
+        }
+        if let Some(range) = self.threshold {
+            state.threshold = Some(ThresholdState { field: self.threshold_field.clone(), range });
+        }
+        if let Some((field, factor, phase)) = self.deform.given() {
+            state.deform =
+                Some(DeformState { field: field.clone(), factor, phase, undeformed: self.undeformed });
         }
         state.outline &= !self.no_outline;
         let colours = &mut state.colours;
@@ -320,6 +372,7 @@ impl Shown {
         colours.range = self.colour_range.or(colours.range);
         colours.log |= self.log;
         colours.reversed |= self.reversed;
+        colours.bands = self.bands.or(colours.bands);
         state.background = self.background.unwrap_or(state.background);
     }
 }

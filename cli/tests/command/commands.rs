@@ -175,6 +175,21 @@ fn camera(eye: [f64; 3], viewport: [u32; 2], pixels: f64) -> Value {
     serde_json::json!({ "matrix": matrix, "viewport": viewport, "pixels": pixels })
 }
 
+/// Nothing is lost without a word: kinds without regions say that there are none.
+#[test]
+fn files_without_the_regions_that_were_asked_for_say_so() {
+    let folder = Folder::new("regions");
+    let [input, mt, other] = ["t.vtu", "t.mt", "other.mt"].map(|name| folder.path(name));
+    good(&["generate", "turbine", "--size", "5", "-o", &input]);
+    let build = |more: &[&str]| json(&[&["build", &input, "-o", &mt, "--json"], more].concat());
+    assert_eq!(build(&["--kind", "vertex", "--preserve", "part"])["regions"], 0);
+    assert!(build(&[])["regions"].is_null(), "nobody asked");
+    assert_eq!(build(&["--preserve", "part"])["regions"], 12);
+    let convert = |kind: &str| json(&["convert", &mt, "--kind", kind, "-o", &other, "--json"]);
+    assert_eq!(convert("vertex")["regions_left_out"], 12);
+    assert!(convert("half-edge")["regions_left_out"].is_null());
+}
+
 /// Options for the same mesh give the same mesh; others give another one.
 #[test]
 fn every_part_can_be_asked_for_in_two_ways() {

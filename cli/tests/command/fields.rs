@@ -141,6 +141,131 @@ fn time_steps_share_one_mesh() {
     bad(1, &["build", &first, &second, "-o", &mt], &["b.vtu", "time step at 1"]);
 }
 
+/// An MT of two time steps, of which the second is the first times -2; its folder.
+pub fn two_steps(name: &str) -> (Folder, String) {
+    let folder = Folder::new(name);
+    let [first, second, mt, list] = ["a.vtu", "b.vtu", "s.mt", "s.pvd"].map(|name| folder.path(name));
+    write(&first, &step(None, 1.0));
+    write(&second, &step(None, -2.0));
+    fs::write(
+        &list,
+        "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"-1\" file=\"a.vtu\"/>\
+         <DataSet timestep=\"3.5\" file=\"b.vtu\"/></Collection></VTKFile>",
+    )
+    .expect("a new file");
+    good(&["build", &list, "-o", &mt, "--all-fields", "--lossless", "--quiet"]);
+    (folder, mt)
+}
+
+/// The names of a table's columns, and its rows.
+fn table(path: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let text = fs::read_to_string(path).expect("a table");
+    let mut lines = text.lines();
+    let names = lines.next().expect("a head").split(',').map(str::to_owned).collect();
+    let row = |line: &str| line.split(',').map(|value| value.parse().expect("a number")).collect();
+    (names, lines.map(row).collect())
+}
+
+#[test]
+fn a_time_says_which_step_is_meant() {
+    let (folder, mt) = two_steps("a-time");
+    let mean = |time: &[&str]| {
+        let report = json(&[&["stats", &mt, "--field", "p", "--json"], time].concat());
+        (report["time"].clone(), number(&report, "mean"))
+    };
+    let (first, second) = (mean(&[]), mean(&["--time", "3.5"]));
+    assert_eq!((&first.0, &second.0), (&(-1.0).into(), &3.5.into()));
+    assert!((second.1 + 2.0 * first.1).abs() < 1e-4 && first.1 > 0.1, "{first:?} {second:?}");
+    assert_eq!(mean(&["--time", "-1"]), first);
+    // As many digits as are told of it.
+    assert_eq!(mean(&["--time", "3.5000001"]), second);
+    // Needs have times of their own, or that of all.
+    for need in ["field=p; time=3.5; error=1%", "field=p; error=1%"] {
+        let report = json(&["stats", &mt, "--field", "p", "--time", "3.5", "--need", need, "--json"]);
+        assert_eq!((&report["time"], &report["satisfied"]), (&3.5.into(), &true.into()));
+    }
+    // What is written has the fields of that time, by their names alone.
+    let [vtu, csv] = ["m.vtu", "m.csv"].map(|name| folder.path(name));
+    json(&["extract", &mt, "--time", "3.5", "-o", &vtu, "--json"]);
+    let read = io::read(vtu.as_ref()).expect("a mesh");
+    assert_eq!(
+        read.fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>()[..4],
+        ["p", "U_x", "U_y", "U_z"]
+    );
+    assert!(read.fields.iter().all(|field| field.time == Some(3.5)));
+    let known = |[x, y, z]: &[f64; 3]| -2.0 * (x * x + y * z);
+    let pairs = || read.positions.iter().zip(&read.fields[0].values);
+    assert_eq!(pairs().count(), 80);
+    assert!(pairs().all(|(p, value)| (value - known(p)).abs() < 1e-4), "{:?}", pairs().collect::<Vec<_>>());
+    let surface = ["surface", &mt, "--deform", "U", "--factor", "1", "-o", &csv, "--json"];
+    let report = json(&[&surface[..], &["--time", "3.5"]].concat());
+    assert_eq!((&report["time"], &report["deform_time"]), (&3.5.into(), &3.5.into()));
+    let (names, second) = table(&csv);
+    assert_eq!(names, ["x", "y", "z", "p", "U_x", "U_y", "U_z"]);
+    json(&surface);
+    let (names, first) = table(&csv);
+    assert_eq!(names[3..6], ["p@-1.0", "p@3.5", "U_x@-1.0"]);
+    // The displacement, too, is the other one times -2.
+    let place = |row: &[f64], u: usize, factor: f64| (row[2] - factor * row[u]) as f32;
+    let z = |rows: &[Vec<f64>], u: usize| rows.iter().map(|row| place(row, u, 1.0)).collect::<Vec<_>>();
+    let (before, after) = (z(&first, 9), z(&second, 6));
+    assert!(before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-5), "{before:?} {after:?}");
+    let lines =
+        ["streamlines", &mt, "--vector", "U", "--seed", "0.5,0.7,0.7", "--direction", "forward", "-o", &csv];
+    let speed = |time: &str| {
+        good(&[&lines[..], &["--time", time]].concat());
+        let (names, rows) = table(&csv);
+        rows[0][names.iter().position(|name| name == "speed").expect("a speed")]
+    };
+    let speeds = [speed("-1"), speed("3.5")];
+    assert!((speeds[1] / speeds[0] - 2.0).abs() < 1e-4, "{speeds:?}");
+    bad(1, &["stats", &mt, "--field", "p", "--time", "2"], &["'p' has no time step at 2", "-1, 3.5"]);
+    bad(1, &["extract", &mt, "-o", &vtu, "--time", "0"], &["has no time step at 0"]);
+    bad(2, &["stats", &mt, "--time", "soon"], &["not a number"]);
+    // A file without times has no step at any.
+    let [input, plain] = ["plain.vtu", "plain.mt"].map(|name| folder.path(name));
+    write(&input, &step(None, 1.0));
+    good(&["build", &input, "-o", &plain, "--field", "p", "--quiet"]);
+    bad(1, &["stats", &plain, "--time", "2"], &["'p' has no time steps"]);
+    assert_eq!(json(&["stats", &plain, "--json"]).get("time"), None);
+}
+
+#[test]
+fn a_probe_tells_values_over_time() {
+    let (folder, mt) = two_steps("probe-over-time");
+    let point = ["probe", &mt, "--point", "0.5,1,1"];
+    let report = json(&[&point[..], &["--json", "--point", "9,9,9"]].concat());
+    let p = [number(&report["values"][0], "p@-1.0"), number(&report["values"][0], "p@3.5")];
+    assert!((p[0] - 1.25).abs() < 1e-4 && (p[1] + 2.5).abs() < 1e-4, "{p:?}");
+    let over = &report["over_time"];
+    assert_eq!(over["times"], serde_json::json!([-1.0, 3.5]));
+    assert_eq!(over["values"][0]["p"], serde_json::json!(p));
+    assert_eq!(
+        (&over["values"][1], over["values"].as_array().map(Vec::len)),
+        (&serde_json::Value::Null, Some(2))
+    );
+    let told = good(&point);
+    assert!(told.contains("p@-1.0 at 0.5,1,1") && told.contains("p@3.5 at 0.5,1,1"), "{told}");
+    // Of one time it is as without times.
+    let report = json(&[&point[..], &["--time", "3.5", "--json"]].concat());
+    assert_eq!((number(&report["values"][0], "p"), report.get("over_time")), (p[1], None));
+    // A row for each point and time.
+    let csv = folder.path("t.csv");
+    good(&[&point[..], &["--over-time", "-o", &csv]].concat());
+    let (names, rows) = table(&csv);
+    assert_eq!(names, ["point", "x", "y", "z", "time", "p", "U_x", "U_y", "U_z"]);
+    assert_eq!(rows.iter().map(|row| row[4]).collect::<Vec<_>>(), [-1.0, 3.5]);
+    assert_eq!(rows.iter().map(|row| row[5]).collect::<Vec<_>>(), p);
+    good(&["probe", &mt, "--line", "0,1,1,1,1,1", "--samples", "3", "--over-time", "-o", &csv]);
+    let (names, rows) = table(&csv);
+    assert_eq!((names[1].as_str(), names[5].as_str(), rows.len()), ("distance", "time", 6));
+    bad(2, &[&point[..], &["--over-time", "-o", &folder.path("t.vtp")]].concat(), &[".csv"]);
+    bad(2, &[&point[..], &["--over-time"]].concat(), &["--output"]);
+    // An error is one at all times.
+    let report = json(&[&point[..], &["--over-time", "--error", "5%", "-o", &csv, "--json"]].concat());
+    assert_eq!(report["needs"].as_array().map(Vec::len), Some(2));
+}
+
 /// A mesh of two tetrahedra with a field at its cells.
 const TWO_CELLS: &str = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\n\
     FIELD FieldData 1\nTimeValue 1 1 double\n12.5\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\n\
@@ -154,8 +279,47 @@ fn fields_at_cells_become_fields_at_points() {
     fs::write(&input, TWO_CELLS).expect("a new file");
     bad(1, &["build", &input, "-o", &mt], &["rho", "--cell-to-point"]);
     bad(1, &["build", &input, "-o", &mt, "--field", "rho"], &["rho", "--cell-to-point"]);
-    good(&["build", &input, "-o", &mt, "--quiet", "--cell-to-point", "--all-fields", "--field-bits", "24"]);
+    let options = ["--cell-to-point", "--all-fields", "--field-bits", "24", "--unit", "rho=kg"];
+    let report = json(&[&["build", &input, "-o", &mt, "--quiet", "--json"], &options[..]].concat());
     let info = json(&["info", &mt, "--json"]);
+    // What averaging does is said by the build and by the file, in the input's own numbers and places.
+    let extreme = |value: f64, place: [f64; 3]| serde_json::json!({ "value": value, "place": place });
+    let of_cell = |value: f64, z: f64, cell: u32| serde_json::json!({ "value": value, "place": [0.25, 0.25, z], "cell": cell });
+    let input_at_cells = serde_json::json!({ "min": of_cell(4.0, -0.75, 1), "max": of_cell(8.0, 0.25, 0) });
+    let points =
+        serde_json::json!({ "min": extreme(4.0, [0.0, 0.0, -3.0]), "max": extreme(8.0, [0.0, 0.0, 1.0]) });
+    let averaged = &report["averaged"][0];
+    assert_eq!((&averaged["name"], &averaged["unit"]), (&"rho".into(), &"kg".into()));
+    assert_eq!((&averaged["input"], &averaged["points"]), (&input_at_cells, &points));
+    assert!((number(&averaged["difference"], "rms") - 1.6875_f64.sqrt()).abs() < 1e-12);
+    assert_eq!(number(&averaged["difference"], "largest"), 2.25);
+    let field = &info["fields"][0];
+    assert_eq!((&field["extremes"], &field["averaged"]["input"]), (&points, &input_at_cells));
+    assert_eq!(field["averaged"]["difference"], averaged["difference"]);
+    // It stands in front of the updates.
+    let head = json(&["info", &mt, "--head", "--json"]);
+    assert_eq!((&head["full"], &head["fields"][0]["averaged"]), (&false.into(), &field["averaged"]));
+    let told = good(&["info", &mt]);
+    for (name, value) in [
+        ("smallest", "4 at (0, 0, -3)"),
+        ("largest", "8 at (0, 0, 1)"),
+        ("input at cells", "4 in cell 1 at (0.25, 0.25, -0.75) to 8 in cell 0 at (0.25, 0.25, 0.25)"),
+        ("difference", "root mean square 1.29904, 2.25 at most"),
+    ] {
+        let is_row = |line: &str| line.trim().strip_prefix(name).map(str::trim) == Some(value);
+        assert!(told.lines().any(is_row), "{name}: {told}");
+    }
+    // Whoever rewrites the file keeps it, and parts have it, too.
+    let other = folder.path("c.mt");
+    good(&["convert", &mt, "--kind", "vertex", "-o", &other, "--quiet"]);
+    assert_eq!(json(&["info", &other, "--json"])["fields"][0]["averaged"], field["averaged"]);
+    good(&[&["build", &input, "-o", &other, "--quiet", "--parts", "1"], &options[..]].concat());
+    assert_eq!(json(&["info", &other, "--json"])["fields"][0]["averaged"], field["averaged"]);
+    // A field at points is not averaged.
+    assert_eq!(
+        json(&["build", &input, "-o", &other, "--quiet", "--json", "--field", "x"]).get("averaged"),
+        None
+    );
     assert_eq!((names(&info), &info["fields"][0]["time"]), (vec!["rho"], &12.5.into()));
     json(&["extract", &mt, "-o", &out, "--json"]);
     let mut values = io::read(out.as_ref()).expect("a mesh").fields[0].values.clone();

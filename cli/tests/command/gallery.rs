@@ -97,7 +97,7 @@ fn output<'a>(words: &[&'a str]) -> &'a str {
 /// The files that a command reads.
 fn inputs<'a>(words: &[&'a str]) -> impl Iterator<Item = &'a str> {
     let out = output(words);
-    let is_data = |word: &&str| [".vtu", ".vti", ".vtk", ".mt"].iter().any(|end| word.ends_with(end));
+    let is_data = |word: &&str| [".vtu", ".vti", ".vtk", ".pvd", ".mt"].iter().any(|end| word.ends_with(end));
     words.iter().copied().filter(move |word| *word != out && is_data(word))
 }
 

@@ -12,7 +12,7 @@ fn every_volume_that_is_listed_is_built() {
     let help = good(&["generate", "--help"]);
     for (name, sentence) in VOLUMES {
         assert!(help.contains(name) && help.contains(&sentence[..20]), "{help}");
-        let ending = if name == "sphere-flow" { "vtu" } else { "vti" };
+        let ending = if ["sphere-flow", "turbine"].contains(&name) { "vtu" } else { "vti" };
         let [input, mt] = [format!("{name}.{ending}"), format!("{name}.mt")].map(|name| folder.path(&name));
         good(&["generate", name, "--size", "7", "-o", &input]);
         let built = json(&["build", &input, "--all-fields", "-o", &mt, "--json"]);

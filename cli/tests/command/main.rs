@@ -3,6 +3,7 @@
 mod commands;
 #[path = "../../../tests/support/data.rs"]
 mod data;
+mod deform;
 mod fields;
 mod gallery;
 mod generate;

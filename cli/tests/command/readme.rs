@@ -14,17 +14,21 @@ const START: &str = "```console";
 pub const PROMPT: &str = "$ tetralod ";
 
 /// The pages with commands. Each is run in a folder of its own.
-const PAGES: [&str; 15] = [
+const PAGES: [&str; 19] = [
     "README.md",
     "docs/README.md",
     "docs/command.md",
     "docs/csp-and-cors.md",
     "docs/howto/big-models.md",
     "docs/howto/build-in-page.md",
+    "docs/howto/deformed.md",
     "docs/howto/element.md",
     "docs/howto/fields-and-time.md",
     "docs/howto/know-a-file.md",
+    "docs/howto/movies.md",
     "docs/howto/my-data.md",
+    "docs/howto/parts.md",
+    "docs/howto/inspect.md",
     "docs/howto/notebooks.md",
     "docs/howto/several-meshes.md",
     "docs/howto/three.md",

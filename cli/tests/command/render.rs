@@ -3,6 +3,7 @@
 //!
 //! It needs a Vulkan driver, for which software will do.
 
+use crate::fields::two_steps;
 use crate::support::{Folder, bad, bucky, good, json, run, text};
 use std::fs;
 use std::fs::File;
@@ -20,7 +21,13 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// A picture; of a movie all of its pictures below one another, without words about it.
     pub fn read(path: &str) -> Self {
+        if path.ends_with(".gif") {
+            let (size, pictures, _) = gif_pictures(path);
+            let size = [size[0], size[1] * pictures.len() as u32];
+            return Self { size, channels: 4, bytes: pictures.concat(), about: String::new() };
+        }
         let decoder = png::Decoder::new(BufReader::new(File::open(path).expect("a picture")));
         let mut reader = decoder.read_info().expect("PNG");
         let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
@@ -114,6 +121,149 @@ fn options_change_the_picture() {
     assert!(after.differing(&before) > 100);
     let report = json(&[&["render", &mt, "-o", &out, "--json", "--mode", "slice"], &SMALL[..]].concat());
     assert_eq!((&report["width"], &report["colours"]["of"]), (&120.into(), &"density".into()));
+}
+
+#[test]
+fn a_time_step_has_the_colours_of_all() {
+    let (folder, mt) = two_steps("coloured-steps");
+    let out = folder.path("a.png");
+    let drawn = |more: &[&str]| {
+        let all = ["render", &mt, "-o", &out, "--size", "120x90", "--samples", "1", "--json", "--field", "p"];
+        let report = json(&[&all[..], more].concat());
+        (report, Picture::read(&out))
+    };
+    let [(first, before), (second, after)] =
+        ["-1", "3.5"].map(|time| drawn(&["--mode", "boundary", "--time", time]));
+    assert_eq!((&first["time"], &second["time"]), (&(-1.0).into(), &3.5.into()));
+    assert_eq!(first["colours"], second["colours"]);
+    assert!(before.differing(&after) > 300);
+    assert!(after.about.starts_with("s.mt: p at time 3.5, "), "{}", after.about);
+    let (moved, _) = drawn(&["--mode", "boundary", "--time", "3.5", "--deform", "U", "--factor", "0.1"]);
+    assert_eq!((&moved["deform_time"], &moved["colours"]), (&3.5.into(), &first["colours"]));
+    // Another field has the colours of all of its steps, too.
+    let by = |time| drawn(&["--mode", "isosurface", "--colour-field", "U_z", "--time", time]).0;
+    assert_eq!((&by("-1")["colours"], &by("3.5")["colours"]["of"]), (&by("3.5")["colours"], &"U_z".into()));
+}
+
+/// The size of a .gif, its pictures as RGBA, and how long each is shown, in hundredths of a second.
+fn gif_pictures(path: &str) -> ([u32; 2], Vec<Vec<u8>>, Vec<u16>) {
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = options.read_info(File::open(path).expect("a movie")).expect("GIF");
+    let size = [decoder.width(), decoder.height()].map(u32::from);
+    let (mut pictures, mut delays) = (Vec::new(), Vec::new());
+    while let Some(frame) = decoder.read_next_frame().expect("a picture") {
+        delays.push(frame.delay);
+        pictures.push(frame.buffer.to_vec());
+    }
+    (size, pictures, delays)
+}
+
+/// The pictures of an .apng.
+fn apng_pictures(path: &str) -> Vec<Vec<u8>> {
+    let decoder = png::Decoder::new(BufReader::new(File::open(path).expect("a movie")));
+    let mut reader = decoder.read_info().expect("PNG");
+    let count = reader.info().animation_control().expect("a movie").num_frames;
+    let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
+    let mut next = || {
+        reader.next_frame(&mut bytes).expect("a picture");
+        bytes.clone()
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+#[test]
+fn a_movie_has_the_pictures_that_single_ones_are() {
+    let (folder, mt, out) = prepared("turntable", 9);
+    let [gif, apng, one] = ["a.gif", "a.apng", "one.png"].map(|name| folder.path(name));
+    let movie = ["--mode", "boundary", "--turntable", "4"];
+    let report = |out: &str, more: &[&str]| {
+        json(&[&["render", &mt, "-o", out, "--json"], &SMALL[..], &movie, more].concat())
+    };
+    let told = report(&out, &[]);
+    assert_eq!((&told["pictures"], told.get("fps"), told.get("times")), (&4.into(), None, None));
+    let paths = [1, 2, 3, 4].map(|number| folder.path(&format!("a-000{number}.png")));
+    let files = folder.names();
+    assert_eq!(files.iter().filter(|name| name.ends_with(".png")).count(), 4, "{files:?}");
+    let pictures = paths.each_ref().map(|path| Picture::read(path));
+    let turned = ["0,0", "90,0", "180,0", "270,0"];
+    for (picture, turn) in pictures.iter().zip(turned) {
+        // Of a cube that is turned by quarters, each picture alone has the same distance.
+        let alone = draw(&mt, &one, &["--mode", "boundary", "--turn", turn]);
+        assert!(picture.differing(&alone) < 20, "{turn}");
+    }
+    assert!(pictures[1].differing(&pictures[0]) > 300);
+    // One file has the same, exactly or in 256 colours.
+    assert_eq!(report(&apng, &[])["fps"], 20.0);
+    assert_eq!(apng_pictures(&apng), pictures.each_ref().map(|picture| picture.bytes.clone()));
+    assert_eq!(report(&gif, &["--fps", "30"])["fps"], 30.0);
+    let (size, found, delays) = gif_pictures(&gif);
+    assert_eq!((size, found.len(), delays), ([120, 90], 4, vec![3, 4, 3, 3]));
+    for (found, picture) in found.iter().zip(&pictures) {
+        let pairs = found.as_chunks::<4>().0.iter().zip(picture.bytes.as_chunks::<3>().0);
+        let off = pairs.map(|(a, b)| (0..3).map(|k| u64::from(a[k].abs_diff(b[k]))).sum::<u64>());
+        assert!(off.sum::<u64>() < 3 * 4 * 120 * 90, "the colours are others");
+    }
+    // The same again.
+    for (path, more) in [(&apng, &[][..]), (&gif, &["--fps", "30"])] {
+        let before = fs::read(path).expect("a movie");
+        report(path, more);
+        assert!(before == fs::read(path).expect("a movie"), "{path} is not the same again");
+    }
+    // What is transparent stays it.
+    report(&gif, &["--background", "transparent", "--no-outline"]);
+    let corner = |picture: &Vec<u8>| picture[3];
+    let middle = |picture: &Vec<u8>| picture[4 * (45 * 120 + 60) + 3];
+    let (_, found, _) = gif_pictures(&gif);
+    assert!(found.iter().all(|picture| (corner(picture), middle(picture)) == (0, 255)));
+    let refused: [(i32, &[&str], &str); 6] = [
+        (2, &["-o", &gif], "--turntable"),
+        (2, &["-o", &out, "--turntable", "4", "--fps", "3"], "--fps"),
+        (2, &["-o", &gif, "--turntable", "4", "--fps", "60"], "50"),
+        (2, &["-o", &gif, "--swing", "4"], "--deform"),
+        (2, &["-o", &gif, "--turntable", "1"], "2"),
+        (1, &["-o", &gif, "--over-time"], "no time steps"),
+    ];
+    for (code, options, word) in refused {
+        bad(code, &[&["render", &mt], options].concat(), &[word]);
+    }
+    bad(2, &["render", &mt, "-o", &gif, "--over-time", "--time", "1"], &["cannot be used with"]);
+}
+
+#[test]
+fn movies_go_over_time_and_through_a_period() {
+    let (folder, mt) = two_steps("movies");
+    let [movie, out] = ["a.apng", "a.png"].map(|name| folder.path(name));
+    let small = ["--size", "120x90", "--samples", "2", "--field", "p", "--mode", "boundary", "--json"];
+    let drawn = |out: &str, more: &[&str]| json(&[&["render", &mt, "-o", out], &small[..], more].concat());
+    let alone = |more: &[&str]| {
+        drawn(&out, more);
+        Picture::read(&out).bytes
+    };
+    // Without an error all have the reference mesh.
+    let report = drawn(&movie, &["--over-time"]);
+    assert_eq!((&report["times"], report.get("time")), (&serde_json::json!([-1.0, 3.5]), None));
+    assert_eq!((&report["fps"], &report["pictures"]), (&5.0.into(), &2.into()));
+    let pictures = apng_pictures(&movie);
+    assert!(pictures == ["-1", "3.5"].map(|time| alone(&["--time", time])));
+    assert!(pictures[0] != pictures[1]);
+    // With one they have one mesh that is as good at all times, so no smaller than that of either.
+    let count = |report: &serde_json::Value| report["tetrahedra"].as_u64().expect("a count");
+    let all = drawn(&movie, &["--over-time", "--error", "10%", "--need", "range=-1,0; error=1%"]);
+    assert!(all["needs"].as_array().expect("needs").len() == 4 && all["satisfied"] == true, "{all}");
+    for time in ["-1", "3.5"] {
+        let one = drawn(&out, &["--time", time, "--error", "10%", "--need", "range=-1,0; error=1%"]);
+        assert!(count(&one) <= count(&all), "{time}");
+    }
+    // A period, in which the camera stays where it is.
+    let deform = ["--deform", "U", "--factor", "0.1", "--time", "3.5"];
+    let report = drawn(&movie, &[&deform[..], &["--swing", "4"]].concat());
+    assert_eq!((&report["time"], &report["deform_time"]), (&3.5.into(), &3.5.into()));
+    let pictures = apng_pictures(&movie);
+    let phases =
+        ["0", "0.25", "0.5", "0.75"].map(|phase| alone(&[&deform[..], &["--phase", phase]].concat()));
+    assert!(pictures == phases);
+    assert!(phases[0] == phases[2] && phases[1] != phases[3]);
 }
 
 #[test]

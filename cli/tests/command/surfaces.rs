@@ -168,6 +168,21 @@ fn points_have_their_values() {
     assert_eq!((number(&report, "points"), number(&report, "outside")), (17.0 * 81.0, 0.0));
     fs::write(&input, "x,y,z\n1,2\n").expect("a file");
     bad(1, &["probe", &mt, "--points", &input], &["in.csv", "line 2", "3 numbers"]);
+    // Only what the points need is refined, and they have the values of the whole reference mesh.
+    let one =
+        ["probe", &mt, "--point", "0.3,0.4,0.5", "--point", "1.9,0.9,0.1", "--point", "-1,0,0", "--json"];
+    let (some, all) = (json(&one), json(&[&one[..], &["--need", "error=0"]].concat()));
+    assert_eq!((&some["values"], &some["error_bound"]), (&all["values"], &all["error_bound"]));
+    assert!(number(&some, "tetrahedra") < 0.5 * number(&all, "tetrahedra"), "{some}");
+    assert!(number(&some, "bytes_read") <= number(&all, "bytes_read"));
+    let one = ["probe", &mt, "--line", "0,0.1,0.2,2,0.9,0.8", "-o", &out, "--json"];
+    let some = (json(&one), table(&out).1);
+    let all = (json(&[&one[..], &["--need", "error=0"]].concat()), table(&out).1);
+    // The same tetrahedra have other numbers.
+    let values =
+        |rows: &[Vec<f64>]| rows.iter().map(|row| [&row[..4], &row[5..]].concat()).collect::<Vec<_>>();
+    assert_eq!(values(&some.1), values(&all.1));
+    assert!(number(&some.0, "tetrahedra") < 0.7 * number(&all.0, "tetrahedra"), "{}", some.0);
     bad(2, &["probe", &mt], &["--point"]);
     bad(2, &["probe", &mt, "--point", "1,2,3", "--line", "0,0,0,1,1,1"], &["--point", "--line"]);
     bad(2, &["probe", &mt, "--point", "1,2,3", "--samples", "3"], &["--line"]);

@@ -50,8 +50,18 @@ pub enum BuildError {
         /// The names of its fields.
         known: Vec<String>,
     },
+    /// The labels part the mesh into too many regions.
+    #[error(
+        "the labels part the mesh into {count} regions, of which there may be {most}: keep fewer arrays apart"
+    )]
+    Regions {
+        /// How many regions there are.
+        count: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// A label is not an integer.
-    #[error("'{name}' is no label: labels are integers, but number {at} is {value}")]
+    #[error("'{name}' is no label: labels are integers of less than 2^53, but number {at} is {value}")]
     Label {
         /// The name of the label.
         name: String,
@@ -59,6 +69,14 @@ pub enum BuildError {
         at: u32,
         /// The value that is no integer.
         value: f64,
+    },
+    /// A label is another one at another time.
+    #[error(
+        "'{name}' changes from one time step to another: keep apart by a label that stays, or build a single step"
+    )]
+    LabelChanges {
+        /// The name of the label.
+        name: String,
     },
     /// There is no point where one is to be kept.
     #[error(
@@ -197,6 +215,7 @@ impl tetralod::Coded for BuildError {
             Self::Combination { .. }
             | Self::UnknownField { .. }
             | Self::CellField { .. }
+            | Self::UnknownLabel { .. }
             | Self::TooManyFields { .. }
             | Self::Tolerance { .. }
             | Self::Option { .. } => "bad-option",

@@ -9,9 +9,9 @@ pub struct BuildConfig {
     /// The kind of MT and how it is built.
     pub construction: Construction,
     /// Names of the fields to keep, in this order; a vector's name means its components. Of a time series all steps are
-    /// kept. If empty, the first field that does not number something or say where it is, by its name.
+    /// kept. If empty, the first field that is no component and does not number something or say where it is, by its name.
     pub fields: Vec<String>,
-    /// Keep all fields but the lengths of vectors, which follow from their components; those that are named come first.
+    /// Keep all fields but those that follow from components, as the lengths of vectors; those that are named come first.
     pub all_fields: bool,
     /// Bits of the position lattice, 1 to 30. If neither these nor a tolerance are given: 16 where that keeps every cell
     /// positive, else as few as do, and two more to spare. No side of the domain is longer than 2^bits steps.

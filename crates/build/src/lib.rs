@@ -169,10 +169,10 @@ fn half_edge_mt(
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
     let how = (BuildCriterion::HalfEdge, purpose);
-    let Decimated::<Collapses> { record, quantized, info, interface_deviation } =
+    let Decimated::<Collapses> { record, quantized, info, interface_deviation, regions } =
         decimate::decimate(mesh, config, how, progress)?;
     let block_bits = config.block_bits.clamp(4, 16);
-    let (mt, vertices, summary) = record.half_edge_mt(info, &quantized, block_bits, progress)?;
+    let (mt, vertices, summary) = record.half_edge_mt(info, regions, &quantized, block_bits, progress)?;
     let summary = BuildSummary { interface_deviation, ..summary };
     let exact = lattice::field_selection::exact_values(mesh, config, &vertices)?;
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })

@@ -42,7 +42,7 @@ pub(super) fn decimated_mt(
     how: (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>, f64), BuildError> {
-    let Decimated::<Sequence> { record, quantized, info, interface_deviation } =
+    let Decimated::<Sequence> { record, quantized, info, interface_deviation, .. } =
         decimate::decimate(&mut Cow::Borrowed(mesh), config, how, progress)?;
     let (mt, vertices) = record.explicit_mt(info, &quantized, progress)?;
     Ok((mt, vertices, interface_deviation))

@@ -238,6 +238,21 @@ fn pyramids_around() -> Vec<Part> {
 }
 
 impl Recipe {
+    /// The faces of a cell with these points as a polyhedron lists them; none if it has parts, or a point twice, or triangles alone.
+    pub fn faces(&self, listed: &[i64]) -> Option<Vec<i64>> {
+        let [part] = self.parts.as_slice() else { return None };
+        let mut sorted = listed.to_vec();
+        sorted.sort_unstable();
+        if sorted.windows(2).any(|pair| pair[0] == pair[1]) || part.iter().all(|face| face.len() == 3) {
+            return None;
+        }
+        let of_face = |face: &Vec<u8>| -> Vec<i64> {
+            let points = face.iter().map(|&p| listed[usize::from(p)]);
+            std::iter::once(face.len() as i64).chain(points).collect()
+        };
+        Some(std::iter::once(part.len() as i64).chain(part.iter().flat_map(of_face)).collect())
+    }
+
     /// The tetrahedra at most that a cell becomes; it depends on the order of its vertices for few types.
     pub fn most_tets(&self) -> usize {
         self.parts.iter().map(most_tets).sum()

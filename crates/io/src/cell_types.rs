@@ -4,6 +4,8 @@
 pub(super) const EMPTY: i64 = 0;
 /// And for a tetrahedron.
 pub(super) const TETRAHEDRON: i64 = 10;
+/// And for a cell that lists its faces.
+pub(super) const POLYHEDRON: i64 = 42;
 /// And for cells that say no more than that there are points.
 pub(super) const VERTICES: [i64; 2] = [1, 2];
 /// And for cells without a volume: linear, quadratic, and of any order.

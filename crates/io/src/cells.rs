@@ -1,7 +1,8 @@
 //! Cells as files list them, to tetrahedra.
 //!
-//! Cells with a volume are split by the recipes of `cell_shapes`; those without one (vertices, lines, polygons), which
-//! meshers write beside them for boundaries, are left out. What cannot be split is refused, counted by type.
+//! Cells with a volume are split by the recipes of `cell_shapes`, and those that list their faces by `polyhedra`; those without one
+//! (vertices, lines, polygons), which meshers write beside them for boundaries, are left out. What cannot be split is refused, counted by
+//! type.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -10,11 +11,13 @@ use std::ops::Range;
 
 use crate::MemoryLimit;
 use crate::cell_shapes::{PYRAMID_14, Recipe, middles, recipe};
-use crate::cell_types::{ANY_ORDER, ANY_ORDERS, GHOST, HIDDEN, TETRAHEDRON, VERTICES, is_flat};
+use crate::cell_types::{ANY_ORDER, ANY_ORDERS, GHOST, HIDDEN, POLYHEDRON, TETRAHEDRON, VERTICES, is_flat};
 use crate::error::{ReadReason, cell_name, names};
 use crate::ghosts::{GHOST_CELL, HIDDEN_CELL};
 use crate::number::NumberType;
-use tetralod::mesh::{BitSet, CellNumbers, Field, MeshInput};
+use crate::numbering::Numbering;
+use crate::polyhedra::{self, FaceLists, Splitter, TakeFaces};
+use tetralod::mesh::{BitSet, CellNumbers, Field, MeshInput, Note};
 
 /// Cells of any order that are those of another type: type, points, and that one.
 const SAME_AS: [(i64, i64, i64); 12] = [
@@ -32,9 +35,9 @@ const SAME_AS: [(i64, i64, i64); 12] = [
     (81, 5, 14),
 ];
 
-/// Whether the number of points of cells of these types says what they are.
+/// Whether the number of points of cells of these types says what they are, or how many tetrahedra they become.
 pub(super) fn depend_on_points(types: &[i64]) -> bool {
-    types.iter().any(|kind| ANY_ORDERS.contains(kind))
+    types.iter().any(|kind| ANY_ORDERS.contains(kind) || *kind == POLYHEDRON)
 }
 
 /// Gives cells of any order the types that they have with their number of points; those of a higher order get a number of our own.
@@ -62,7 +65,7 @@ fn points_of_flat(kind: i64) -> Option<i64> {
 }
 
 /// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a
-/// volume, with the number of each type.
+/// volume, with the number of each type. Polyhedra are not counted: their types do not say how many those become.
 pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
     let counts = counts_of(types);
     let mut tets = 0_u64;
@@ -71,11 +74,11 @@ pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
             Some(recipe) => tets = tets.saturating_add(count.saturating_mul(recipe.most_tets() as u64)),
             // How many a cell of any order has is known with its points: the most of the second order.
             None if ANY_ORDERS.contains(&kind) => tets = tets.saturating_add(count.saturating_mul(48)),
-            None if is_flat(kind) => {}
+            None if is_flat(kind) || kind == POLYHEDRON => {}
             None => return Err(ReadReason::CellTypes(counts.into_iter().collect())),
         }
     }
-    if tets == 0 && !types.is_empty() {
+    if tets == 0 && !types.is_empty() && !counts.contains_key(&POLYHEDRON) {
         return Err(ReadReason::CellTypes(counts.into_iter().collect()));
     }
     Ok(tets)
@@ -124,33 +127,6 @@ impl Recipes {
             }
         }
         self.known[self.last].1.as_ref()
-    }
-}
-
-/// What the points of a part of a file are called in the mesh.
-pub(super) enum Numbering {
-    /// As many points, of which the first has this number.
-    From { first: u32, points: usize },
-    /// Each has its own.
-    Each(Vec<u32>),
-}
-
-impl Numbering {
-    fn points(&self) -> usize {
-        match self {
-            Self::From { points, .. } => *points,
-            Self::Each(numbers) => numbers.len(),
-        }
-    }
-
-    fn of(&self, cell: usize, point: i64) -> Result<u32, ReadReason> {
-        let index = usize::try_from(point).ok().filter(|p| *p < self.points());
-        let number = index.and_then(|p| match self {
-            Self::From { first, .. } => u32::try_from(p).ok().and_then(|p| p.checked_add(*first)),
-            Self::Each(numbers) => numbers.get(p).copied(),
-        });
-        let points = || self.points() as u64;
-        number.ok_or_else(|| ReadReason::MissingPoint { cell: cell as u64, point, points: points() })
     }
 }
 
@@ -278,6 +254,7 @@ pub(super) struct CellList<'a> {
     pub types: Vec<i64>,
     /// Where the points of each cell end in the list of all.
     pub ends: Vec<i64>,
+    /// The points of each cell; of polyhedra their faces.
     pub connectivity: Indices<'a>,
 }
 
@@ -287,15 +264,39 @@ fn end_of(end: &i64) -> usize {
 }
 
 impl CellList<'_> {
-    /// Splits the cells, and drops them.
-    pub fn split(self, numbering: &Numbering, memory: &MemoryLimit) -> Result<Split, ReadReason> {
-        let Self { types, ends, connectivity } = &self;
+    /// These cells, whose polyhedra list their points, with the faces of those.
+    pub fn with_faces(self, faces: &FaceLists) -> Result<Self, ReadReason> {
+        let (connectivity, ends) =
+            polyhedra::listed(&self.types, &self.ends, &self.connectivity.into_list(), faces)?;
+        Ok(Self { types: self.types, ends, connectivity: Indices::Listed(connectivity) })
+    }
+
+    /// The tetrahedra at most that the cells become.
+    pub fn most_tets(&self) -> Result<u64, ReadReason> {
+        let mut tets = most_tets(&self.types)?;
+        if self.types.contains(&POLYHEDRON) {
+            let listed = self.connectivity.all();
+            let polyhedra = self.solid(&listed).filter(|(cell, _)| self.types[*cell] == POLYHEDRON);
+            tets = polyhedra.map(|(_, listed)| polyhedra::triangles(listed)).fold(tets, u64::saturating_add);
+        }
+        Ok(tets)
+    }
+
+    /// Splits the cells, and drops them. Appends the points that polyhedra get to these, and to the values at points.
+    pub fn split(
+        self,
+        numbering: &Numbering,
+        positions: &mut Vec<[f64; 3]>,
+        fields: &mut [Field],
+        memory: &MemoryLimit,
+    ) -> Result<Split, ReadReason> {
+        let types = &self.types;
         let mut split = Split::default();
         if !types.is_empty() && types.iter().all(|kind| [HIDDEN, GHOST].contains(kind)) {
             split.describe(types);
             return Ok(split);
         }
-        let tets = most_tets(types)?;
+        let tets = self.most_tets()?;
         let room = usize::try_from(tets).unwrap_or(usize::MAX);
         if types.len() > u32::MAX as usize || room > u32::MAX as usize {
             return Err(ReadReason::TooLarge { what: "cells".into(), limit: u64::from(u32::MAX) });
@@ -303,6 +304,36 @@ impl CellList<'_> {
         // With the number of its cell.
         memory.take(20 * tets)?;
         split.tets.reserve_exact(room);
+        let mut splitter = types.contains(&POLYHEDRON).then(|| Splitter::new(numbering, positions));
+        self.split_all(numbering, splitter.as_mut(), &mut split)?;
+        while let Some(splitter) = &mut splitter
+            && splitter.again(|each| self.each_with_faces(each))?
+        {
+            split = Split { tets: take(&mut split.tets), ..Split::default() };
+            split.tets.clear();
+            self.split_all(numbering, Some(splitter), &mut split)?;
+        }
+        // Where faces got points in their middle, there are more.
+        memory.take(20 * (split.tets.len() as u64).saturating_sub(tets))?;
+        if split.tets.len() < split.tets.capacity() / 2 {
+            split.tets.shrink_to_fit();
+        }
+        split.describe(types);
+        let added = splitter.map(|splitter| splitter.added).unwrap_or_default();
+        if let Some(first) = added.first {
+            split.input.notes.push(Note::Added { points: added.len() as u64, cell: first });
+        }
+        added.append_to(positions, fields, memory)?;
+        Ok(split)
+    }
+
+    fn split_all(
+        &self,
+        numbering: &Numbering,
+        mut splitter: Option<&mut Splitter<'_>>,
+        split: &mut Split,
+    ) -> Result<(), ReadReason> {
+        let Self { types, ends, connectivity } = self;
         let (mut start, mut recipes) = (0, Recipes::default());
         let (mut vertices, mut known) = (Vec::new(), BitSet::default());
         let (mut points, mut begun) = (Cow::default(), 0);
@@ -316,12 +347,23 @@ impl CellList<'_> {
             let listed = listed.ok_or_else(|| ReadReason::Missing(format!("a point of cell {cell}")))?;
             start = end;
             let first = split.tets.len();
-            if let Some((recipe, middles)) = recipes.of(kind) {
+            if let Some(splitter) = &mut splitter
+                && kind == POLYHEDRON
+            {
+                splitter.split(cell, listed, &mut split.tets)?;
+            } else if let Some((recipe, middles)) = recipes.of(kind) {
                 vertices.clear();
                 for &point in listed {
                     vertices.push(numbering.of(cell, point)?);
                 }
+                let is_split = match &mut splitter {
+                    Some(splitter) => {
+                        splitter.split_beside(cell, recipe, listed, &vertices, &mut split.tets)?
+                    }
+                    None => false,
+                };
                 match vertices.as_slice() {
+                    _ if is_split => {}
                     &[a, b, c, d] if kind == TETRAHEDRON => split.tets.push([a, b, c, d]),
                     vertices => recipe.split(vertices, &mut split.tets),
                 }
@@ -334,24 +376,35 @@ impl CellList<'_> {
             }
             split.came_from(cell, first);
         }
-        if split.tets.len() < split.tets.capacity() / 2 {
-            split.tets.shrink_to_fit();
+        Ok(())
+    }
+
+    /// Passes on the faces of all cells that others may share, as those of polyhedra.
+    fn each_with_faces(&self, each: TakeFaces<'_>) -> Result<(), ReadReason> {
+        let (listed, mut recipes) = (self.connectivity.all(), Recipes::default());
+        for (cell, listed) in self.solid(&listed) {
+            let kind = self.types[cell];
+            if kind == POLYHEDRON {
+                each(cell, listed)?;
+            } else if let Some(faces) = recipes.of(kind).and_then(|(recipe, _)| recipe.faces(listed)) {
+                each(cell, &faces)?;
+            }
         }
-        split.describe(types);
-        Ok(split)
+        Ok(())
     }
 
     /// Which of so many points cells with a volume use.
     pub fn used(&self, points: usize) -> Vec<bool> {
         let mut used = vec![false; points];
-        for (_, listed) in self.solid(&self.connectivity.all()) {
-            let listed = listed.iter().filter_map(|&point| usize::try_from(point).ok());
+        for (cell, listed) in self.solid(&self.connectivity.all()) {
+            let listed = polyhedra::points_of(self.types[cell], listed);
+            let listed = listed.filter_map(|point| usize::try_from(point).ok());
             listed.for_each(|point| used.get_mut(point).into_iter().for_each(|used| *used = true));
         }
         used
     }
 
-    /// The cells that have a volume: their numbers and, of these of all, points.
+    /// The cells that have a volume: their numbers and, of these of all, points or faces.
     fn solid<'a>(&self, points: &'a [i64]) -> impl Iterator<Item = (usize, &'a [i64])> {
         let mut start = 0;
         let cells = self.types.iter().zip(&self.ends).enumerate().map(move |(cell, (&kind, end))| {
@@ -392,13 +445,13 @@ impl CellList<'_> {
 
     /// Leaves out the cells with a point that is hidden.
     pub fn hide(&mut self, hidden: &[bool]) {
-        let is_hidden = |point: &i64| {
-            usize::try_from(*point).ok().and_then(|p| hidden.get(p)).is_some_and(|hidden| *hidden)
+        let is_hidden = |point: i64| {
+            usize::try_from(point).ok().and_then(|p| hidden.get(p)).is_some_and(|hidden| *hidden)
         };
         let points = self.connectivity.all();
         let cells: Vec<usize> = self
             .solid(&points)
-            .filter(|(_, listed)| listed.iter().any(is_hidden))
+            .filter(|(cell, listed)| polyhedra::points_of(self.types[*cell], listed).any(is_hidden))
             .map(|(cell, _)| cell)
             .collect();
         cells.into_iter().for_each(|cell| self.types[cell] = HIDDEN);
@@ -409,8 +462,9 @@ impl CellList<'_> {
 mod tests {
     use super::*;
 
-    fn numbering(points: usize) -> Numbering {
-        Numbering::From { first: 100, points }
+    fn split_of(cells: CellList<'_>, points: usize) -> Result<Split, ReadReason> {
+        let numbering = Numbering::From { first: 100, points };
+        cells.split(&numbering, &mut vec![[0.0; 3]; points], &mut [], &MemoryLimit::default())
     }
 
     #[test]
@@ -421,7 +475,7 @@ mod tests {
         assert_eq!(checked_ends(&types, &ends), Ok(15));
         let connectivity = Indices::Listed(connectivity);
         let cells = CellList { types: types.to_vec(), ends: ends.to_vec(), connectivity };
-        let split = cells.split(&numbering(8), &MemoryLimit::default()).unwrap();
+        let split = split_of(cells, 8).unwrap();
         assert_eq!((split.tets.len(), split.tets[0]), (7, [100, 101, 102, 103]));
         let mut fields = [Field::new("m", vec![5.0, 6.0, 7.0]), Field::new("only named", Vec::new())];
         split.spread(&mut fields);
@@ -444,7 +498,7 @@ mod tests {
 
     #[test]
     fn cells_that_are_wrong_are_refused() {
-        assert_eq!(most_tets(&[10, 42]), Err(ReadReason::CellTypes(vec![(10, 1), (42, 1)])));
+        assert_eq!(most_tets(&[10, 41]), Err(ReadReason::CellTypes(vec![(10, 1), (41, 1)])));
         assert_eq!(most_tets(&[5, 5]), Err(ReadReason::CellTypes(vec![(5, 2)])));
         assert_eq!(most_tets(&[]), Ok(0));
         let wrong = |ends: &[i64]| checked_ends(&[10, 12], ends).unwrap_err().to_string();
@@ -457,7 +511,7 @@ mod tests {
         let split = |connectivity: &[i64]| {
             let connectivity = Indices::Listed(connectivity.to_vec());
             let cells = CellList { types: vec![10], ends: vec![4], connectivity };
-            cells.split(&numbering(4), &MemoryLimit::default())
+            split_of(cells, 4)
         };
         let missing = |point| split(&[0, 1, 2, point]).unwrap_err();
         assert_eq!(missing(4), ReadReason::MissingPoint { cell: 0, point: 4, points: 4 });

@@ -10,9 +10,9 @@ pub struct Survey {
     /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, natively also
     /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, and with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
     pub format: &'static str,
-    /// The number of points.
+    /// The number of points. Polyhedra may get more in their middle.
     pub points: u64,
-    /// The tetrahedra, at most, that its cells are or are split into.
+    /// The tetrahedra, at most, that its cells are or are split into; more where bent faces of polyhedra get points in their middle.
     pub cells: u64,
     /// The grid, if it is one.
     pub grid: Option<Grid>,

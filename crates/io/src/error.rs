@@ -104,6 +104,16 @@ pub enum ReadReason {
         /// How many points there are.
         points: u64,
     },
+    /// A polyhedron that is no cell, or that no point in it can be joined to all faces of.
+    #[error(
+        "cell {cell}, a polyhedron, cannot be split into tetrahedra: {fault}; correct it, or leave it out"
+    )]
+    Polyhedron {
+        /// The cell.
+        cell: u64,
+        /// What is wrong with it.
+        fault: String,
+    },
     /// Reading takes more memory than is allowed.
     #[error("reading it takes more memory than the {} that are allowed; allow more, or read fewer fields", mebibytes(*.limit))]
     Memory {
@@ -202,7 +212,7 @@ fn of_cells(counts: &[(i64, u64)]) -> String {
         return no_volume(&list);
     }
     format!(
-        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones and Lagrange \
+        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids, prisms and polyhedra are read, also quadratic ones and Lagrange \
          cells of the first two orders, and what has no volume is left out beside them: convert the others (in ParaView: \
          Tetrahedralize), or save them with an order of at most 2"
     )
@@ -294,7 +304,9 @@ impl tetralod::Coded for ReadError {
             ReadReason::Truncated { .. } => "truncated",
             ReadReason::TooLarge { .. } => "limit",
             ReadReason::Memory { .. } => "memory",
-            ReadReason::NotFinite { .. } | ReadReason::NotFiniteCell { .. } => "bad-mesh",
+            ReadReason::NotFinite { .. }
+            | ReadReason::NotFiniteCell { .. }
+            | ReadReason::Polyhedron { .. } => "bad-mesh",
             ReadReason::Syntax(_)
             | ReadReason::Missing(_)
             | ReadReason::Damaged(_)

@@ -1,13 +1,14 @@
 //! Arrays as scalar fields.
 //!
 //! An array with one component becomes a field of its name. One with several becomes a field for each component,
-//! named `name_x` and so on, and `name_magnitude`, the length of the vector.
+//! named `name_x` and so on, and `name_magnitude`, the length of the vector. Of a symmetric tensor [more follows](OF_TENSORS).
 
 use std::collections::HashMap;
 
 use crate::error::ReadReason;
+use crate::tensors::{OF_TENSORS, Symmetric};
 use crate::{MemoryLimit, ReadOptions};
-use tetralod::mesh::{Field, TetMesh, VectorPart};
+use tetralod::mesh::{Field, TetMesh, VectorPart, is_number_or_place};
 
 /// Most fields of a mesh that are read.
 const MAX_FIELDS: usize = 1024;
@@ -19,8 +20,10 @@ const MAX_NAMES: usize = 1 << 16;
 pub(super) struct Collector<'a> {
     /// Names of the fields to keep, as users give them; all if none.
     wanted: Option<&'a [String]>,
-    /// Whether the first field of all is wanted, too.
+    /// Whether one more field is wanted, that which is shown where none is asked for.
     first: bool,
+    /// The name of that field, as far as the arrays that came say: the first that does not number something or say where it is.
+    default: Option<String>,
     /// Whether only names are wanted.
     lists: bool,
     /// What values are counted in.
@@ -53,7 +56,7 @@ impl<'a> Collector<'a> {
 
     /// Collects fields at cells beside these at points.
     pub fn at_cells(options: &'a ReadOptions, fields: &[Field]) -> Self {
-        Self { first: options.first && fields.is_empty(), ..Self::new(options) }
+        Self { first: options.first && !tell(fields), ..Self::new(options) }
     }
 
     /// Collects the names of all fields.
@@ -114,6 +117,7 @@ impl<'a> Collector<'a> {
         if !self.admits(name, of_components.len())? {
             return Ok(None);
         }
+        self.make_room(name);
         let name = self.free_name(if name.is_empty() { "field" } else { name });
         let fields = self.parts(&name, of_components, has_length);
         Ok(self.chosen(fields, of_components.len()))
@@ -121,15 +125,53 @@ impl<'a> Collector<'a> {
 
     /// Which of the fields are wanted, if any; the names of others are kept.
     fn chosen(&mut self, fields: Vec<Field>, components: usize) -> Option<Claim> {
-        let mut is_first = self.first && self.fields.is_empty();
-        let is_wanted = |field: &Field| {
-            let is_named = self.wanted.is_none_or(|names| names.iter().any(|name| field.answers_to(name)));
-            std::mem::take(&mut is_first) || is_named
-        };
-        let wanted: Vec<bool> = fields.iter().map(is_wanted).collect();
+        // What is shown of a vector is its length, of a symmetric tensor its equivalent value: what comes behind the components.
+        let shown = if fields.len() > components { components } else { 0 };
+        let is_better = self.is_better(&fields[shown].name);
+        if is_better && let Some(before) = self.default.replace(fields[shown].name.clone()) {
+            self.leave(&before);
+        }
+        let is_wanted =
+            |(c, field): (usize, &Field)| self.is_named(field).unwrap_or(true) || is_better && c == shown;
+        let wanted: Vec<bool> = fields.iter().enumerate().map(is_wanted).collect();
         let others = fields.iter().zip(&wanted).filter(|(_, wanted)| !**wanted);
         self.others.extend(others.map(|(field, _)| field.clone()));
         wanted.contains(&true).then_some(Claim { fields, components, wanted })
+    }
+
+    /// Whether it is named; none if nothing is, since all are wanted.
+    fn is_named(&self, field: &Field) -> Option<bool> {
+        self.wanted.map(|names| names.iter().any(|name| field.answers_to(name)))
+    }
+
+    /// Whether a field of this name is to be shown rather than what came before it, where none is asked for: those that are named all the same
+    /// are labels.
+    fn is_better(&self, name: &str) -> bool {
+        let tells = |name: &str| {
+            !is_number_or_place(name) && !self.wanted.unwrap_or_default().iter().any(|label| label == name)
+        };
+        self.first && self.default.as_ref().is_none_or(|before| !tells(before) && tells(name))
+    }
+
+    /// An array has a name that was given to what follows from another one: that goes.
+    fn make_room(&mut self, name: &str) {
+        let follows = |field: &Field| field.name == name && of_tensor(field).is_some();
+        let before = self.fields.len() + self.others.len();
+        self.fields.retain(|field| !follows(field));
+        self.others.retain(|field| !follows(field));
+        if self.fields.len() + self.others.len() < before {
+            self.names.remove(name);
+            self.default.take_if(|default| default == name);
+        }
+    }
+
+    /// Forgets the values of a field that is not named.
+    fn leave(&mut self, name: &str) {
+        let Some(at) = self.fields.iter().position(|field| field.name == name) else { return };
+        if self.is_named(&self.fields[at]) == Some(false) {
+            let field = self.fields.remove(at);
+            self.others.push(field.without_values());
+        }
     }
 
     /// Whether a field of an array of this name may be wanted.
@@ -137,7 +179,7 @@ impl<'a> Collector<'a> {
         let is_part = |wanted: &String| {
             wanted.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'))
         };
-        self.wanted.is_none_or(|names| names.iter().any(is_part)) || self.first && self.fields.is_empty()
+        self.wanted.is_none_or(|names| names.iter().any(is_part)) || self.is_better(name)
     }
 
     fn scalar(&mut self, name: &str) -> Field {
@@ -160,6 +202,17 @@ impl<'a> Collector<'a> {
             fields.push(Field { vector, ..Field::new(own, Vec::new()) });
         }
         if has_length {
+            let count = of_components.len();
+            let is_tensor = [6, 9].contains(&count)
+                && (0..count).map(|c| component_name(count, c)).eq(of_components.iter().cloned());
+            for ending in OF_TENSORS.iter().filter(|_| is_tensor) {
+                let own = format!("{name}_{ending}");
+                // An array that has this name is what is meant by it.
+                if !self.names.contains_key(&own) {
+                    let field = Field { vector: part(None), ..Field::new(self.take_name(&own), Vec::new()) };
+                    fields.push(field);
+                }
+            }
             let own = self.take_name(&format!("{name}_magnitude"));
             fields.push(Field { vector: part(None), ..Field::new(own, Vec::new()) });
         }
@@ -188,10 +241,13 @@ impl<'a> Collector<'a> {
             self.memory.take(8 * (values.len() / components) as u64)?;
             field.unit = unit.to_owned();
             field.integer = integer && c < components;
-            field.values = if c == components {
-                values.chunks_exact(components).map(length).collect()
-            } else {
-                component_of(&values, c, components)
+            let tuples = values.chunks_exact(components);
+            field.values = match of_tensor(&field) {
+                Some(number) => {
+                    tuples.map(|tuple| Symmetric::of(tuple).map_or(f64::NAN, |t| t.value(number))).collect()
+                }
+                None if c >= components => tuples.map(length).collect(),
+                None => component_of(&values, c, components),
             };
             self.fields.push(field);
             self.last += 1;
@@ -245,6 +301,18 @@ impl<'a> Collector<'a> {
             }
         }
     }
+}
+
+/// Whether one of the fields does not just number something, or say where it is.
+pub(super) fn tell(fields: &[Field]) -> bool {
+    fields.iter().any(|field| !is_number_or_place(&field.name))
+}
+
+/// The number in [`OF_TENSORS`] of what follows from a tensor; none for other fields.
+fn of_tensor(field: &Field) -> Option<usize> {
+    let of = field.vector.as_ref().filter(|part| part.component.is_none())?;
+    let ending = field.name.strip_prefix(&of.name)?.strip_prefix('_')?;
+    OF_TENSORS.iter().position(|known| *known == ending)
 }
 
 /// Checks that fields, and positions, are finite at all points that are used, as `used` says, or at all if it says nothing. It is
@@ -315,7 +383,7 @@ pub(super) fn component_of(values: &[f64], component: usize, components: usize) 
 }
 
 /// What a component of so many is called.
-pub(super) fn component_name(components: usize, c: usize) -> String {
+pub(crate) fn component_name(components: usize, c: usize) -> String {
     const AXES: [&str; 3] = ["x", "y", "z"];
     const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
     match components {
@@ -396,12 +464,12 @@ mod tests {
     }
 
     #[test]
-    fn the_first_field_of_all_is_at_points_where_these_have_one() {
+    fn where_none_is_asked_for_it_is_at_points_where_these_have_one() {
         let first = options(None, true);
         let mut points = Collector::new(&first);
         append(&mut points, "v", 2, vec![3.0, 4.0]).unwrap();
         append(&mut points, "s", 1, vec![3.0]).unwrap();
-        assert_eq!(names(&points), ["v_x"]);
+        assert_eq!(names(&points), ["v_magnitude"]);
         let at_cells =
             |fields: &[Field]| Collector::at_cells(&first, fields).claim("m", 1).unwrap().is_some();
         assert!(at_cells(&[]) && !at_cells(&points.fields));
@@ -409,9 +477,64 @@ mod tests {
         let mut both = Collector::new(&with_label);
         append(&mut both, "v", 2, vec![3.0, 4.0]).unwrap();
         append(&mut both, "s", 1, vec![3.0]).unwrap();
-        assert_eq!(names(&both), ["v_x", "s"]);
+        assert_eq!(names(&both), ["v_magnitude", "s"]);
         both.drop_first();
         assert_eq!(names(&both), ["s"]);
+    }
+
+    #[test]
+    fn where_none_is_asked_for_it_is_the_first_that_numbers_nothing() {
+        let shown = |named: &[&str]| {
+            let options = options(Some(named), true);
+            let mut points = Collector::new(&options);
+            for name in ["point_id", "material", "p", "T"] {
+                append(&mut points, name, 1, vec![3.0]).unwrap();
+            }
+            names(&points).join(" ")
+        };
+        assert_eq!(shown(&[]), "p");
+        assert_eq!(shown(&["material"]), "material p");
+        // What is named beside it are labels, whatever they are called.
+        assert_eq!(shown(&["p"]), "p T");
+        let first = options(None, true);
+        let mut numbers = Collector::new(&first);
+        append(&mut numbers, "node_id", 1, vec![1.0]).unwrap();
+        append(&mut numbers, "material", 1, vec![2.0]).unwrap();
+        assert_eq!((names(&numbers), numbers.others[0].name.as_str()), (vec!["node_id"], "material"));
+    }
+
+    #[test]
+    fn what_follows_from_a_tensor_is_made_where_it_is_named() {
+        let uniaxial = vec![-5.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let kept = |options: &ReadOptions| {
+            let mut fields = Collector::new(options);
+            append(&mut fields, "S", 6, uniaxial.clone()).unwrap();
+            (names(&fields).join(" "), fields.fields.iter().map(|field| field.values[0]).collect::<Vec<_>>())
+        };
+        let all =
+            "S_xx S_yy S_zz S_xy S_yz S_xz S_von_mises S_principal_1 S_principal_2 S_principal_3 S_magnitude";
+        assert_eq!(kept(&ReadOptions::default()).0, all);
+        assert_eq!(kept(&options(None, true)), ("S_von_mises".into(), vec![5.0]));
+        assert_eq!(kept(&options(Some(&["S_principal_3", "S_yy"]), false)).1, [0.0, -5.0]);
+        // An array that has such a name is what is meant by it, wherever it stands.
+        for before in [true, false] {
+            for options in [options(Some(&["S_von_mises", "S_principal_1"]), false), options(None, true)] {
+                let mut fields = Collector::new(&options);
+                let arrays = [("S", 6, uniaxial.clone()), ("S_von_mises", 1, vec![7.0])];
+                let order = if before { [1, 0] } else { [0, 1] };
+                for (name, components, values) in order.map(|i| arrays[i].clone()) {
+                    append(&mut fields, name, components, values).unwrap();
+                }
+                let found = fields.fields.iter().find(|field| field.name == "S_von_mises").unwrap();
+                assert_eq!(found.values, [7.0]);
+                assert_eq!(fields.fields.len(), if options.first { 1 } else { 2 });
+            }
+        }
+        let mut known = Collector::of_names();
+        let claim = known.claim("S", 9).unwrap().unwrap();
+        known.keep_names(claim, "Pa");
+        assert_eq!(known.fields.len(), 9 + 1 + 4);
+        assert_eq!(known.fields[10].name, "S_principal_1");
     }
 
     #[test]

@@ -4,12 +4,13 @@
 //! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
 //! offsets and connectivity, older ones as counts followed by indices.
 
-use crate::cells::{CellList, Indices, Numbering};
+use crate::cells::{CellList, Indices};
 use crate::error::{At, ReadError, ReadReason, expect_count, shown};
-use crate::fields::{Collector, check_finite, check_finite_cells};
+use crate::fields::{Collector, check_finite, check_finite_cells, tell};
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
 use crate::grid::{self, Ghosts, GridValues, Placement};
 use crate::number::{NumberType, points_from};
+use crate::numbering::Numbering;
 use crate::scanner::Scanner;
 use crate::{CellData, MemoryLimit, ReadOptions, Survey, cell_types, cells};
 use percent_encoding::percent_decode_str;
@@ -48,19 +49,27 @@ pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
     let [fields, cell_fields] = [(); 2].map(|()| Collector::of_names());
     let mut body = Body { skims: true, fields, cell_fields, ..Body::new(&options, None) };
     body.read(&mut file)?;
+    // What some cells become is known with their points: these are read now.
+    let of_cells = if cells::depend_on_points(&body.types) {
+        let mut cells = Body { skims: true, lists_cells: true, ..Body::new(&options, None) };
+        let (mut file, ..) = Reader::open(bytes).at(|| "header".into())?;
+        file.skims = true;
+        cells.read(&mut file)?;
+        let listed = cells.listed(&file)?.unwrap_or_default();
+        Some(listed.most_tets().at(|| "CELL_TYPES".into())?)
+    } else {
+        None
+    };
     if kind == "structured_points" {
         let placement = body.placement()?;
         let fields = [body.fields.fields, body.cell_fields.fields];
         return Survey::of_placement("vtk", &placement, fields).at(|| "DIMENSIONS".into());
     }
-    if cells::depend_on_points(&body.types) {
-        let ends = body.ends_of_cells(file.version).at(|| "CELLS".into())?;
-        cells::resolve_orders(&mut body.types, &ends);
-    }
-    let (points, cells) = match body.dims {
-        Some(dims) => (dims.iter().fold(1_u64, |n, d| n.saturating_mul(*d)), grid::most_tets(dims)),
-        None if cells::are_points(&body.types) => (body.points as u64, 0),
-        None => (body.points as u64, cells::most_tets(&body.types).at(|| "CELL_TYPES".into())?),
+    let (points, cells) = match (body.dims, of_cells) {
+        (Some(dims), _) => (dims.iter().fold(1_u64, |n, d| n.saturating_mul(*d)), grid::most_tets(dims)),
+        (None, Some(tets)) => (body.points as u64, tets),
+        (None, None) if cells::are_points(&body.types) => (body.points as u64, 0),
+        (None, None) => (body.points as u64, cells::most_tets(&body.types).at(|| "CELL_TYPES".into())?),
     };
     let (fields, cell_fields) = (body.fields.fields, body.cell_fields.fields);
     Ok(Survey { format: "vtk", points, cells, grid: None, fields, cell_fields })
@@ -384,6 +393,8 @@ struct Body<'a> {
     tuples: usize,
     /// Whether the file gives no numbers.
     skims: bool,
+    /// Whether it gives those of cells nevertheless.
+    lists_cells: bool,
 }
 
 impl<'a> Body<'a> {
@@ -476,6 +487,14 @@ impl<'a> Body<'a> {
     }
 
     fn cells(&mut self, file: &mut Reader<'_>) -> Result<(), ReadReason> {
+        let skims = file.skims;
+        file.skims &= !self.lists_cells;
+        let read = self.numbers_of_cells(file);
+        file.skims = skims;
+        read
+    }
+
+    fn numbers_of_cells(&mut self, file: &mut Reader<'_>) -> Result<(), ReadReason> {
         let (count, size) = (file.count()?, file.count()?);
         if file.version < 5 {
             self.cells = Some(count);
@@ -585,7 +604,7 @@ impl<'a> Body<'a> {
 
     /// The fields at cells, of which there are `cells`, beside those at points.
     fn take_cell_fields(&mut self, cells: usize) -> Result<Vec<Field>, ReadReason> {
-        if !self.fields.fields.is_empty() {
+        if tell(&self.fields.fields) {
             self.cell_fields.drop_first();
         }
         if self.cell_data == CellData::Values {
@@ -613,7 +632,9 @@ impl<'a> Body<'a> {
                 |cell: usize| listed.types.get(cell).is_some_and(|kind| !cell_types::is_flat(*kind));
             check_finite_cells(&mesh.cell_fields, is_there).at(|| "CELL_DATA".into())?;
             let numbering = Numbering::From { first: 0, points: mesh.positions.len() };
-            let split = listed.split(&numbering, &self.memory).at(|| "CELLS".into())?;
+            let split = listed
+                .split(&numbering, &mut mesh.positions, &mut self.fields.fields, &self.memory)
+                .at(|| "CELLS".into())?;
             split.spread(&mut mesh.cell_fields);
             mesh.tets = split.tets;
             mesh.input.append(split.input);
@@ -630,11 +651,17 @@ impl<'a> Body<'a> {
     }
 
     fn unstructured(mut self, file: &Reader<'_>) -> Result<TetMesh, ReadError> {
-        let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
         let positions = self.take_positions()?;
+        let listed = self.listed(file)?;
+        self.mesh(positions, listed)
+    }
+
+    /// The cells that were read; none if there are points alone.
+    fn listed(&mut self, file: &Reader<'_>) -> Result<Option<CellList<'static>>, ReadError> {
+        let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
         expect_count("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
         if cells > 0 && cells::are_points(&self.types) {
-            return self.mesh(positions, None);
+            return Ok(None);
         }
         cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
         let ends = self.ends_of_cells(file.version).at(|| "CELLS".into())?;
@@ -654,7 +681,7 @@ impl<'a> Body<'a> {
         if let Some(flags) = of_points {
             listed.hide(&flags.iter().map(|flags| flags & HIDDEN_POINT != 0).collect::<Vec<_>>());
         }
-        self.mesh(positions, Some(listed))
+        Ok(Some(listed))
     }
 
     /// Where each cell ends in the list of indices, which has nothing else then.

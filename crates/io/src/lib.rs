@@ -26,11 +26,12 @@
 //!
 //! Regular grids are split into tetrahedra, six a cube, and carry their [`Grid`](tetralod::mesh::Grid).
 //! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
-//! `name_magnitude`. Units and times are kept where the file contains them. Arrays at cells are read where that is asked
-//! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
+//! `name_magnitude`, of a symmetric tensor also `name_von_mises` and `name_principal_1` to 3. Units and times are kept
+//! where the file contains them. Arrays at cells are read where that is asked for ([`ReadOptions::cells`]), arrays that
+//! are not numbers are left out.
 //! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`].
-//! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
-//! volume are left out beside them. How cells are split is in `cell_shapes`. Readers check the file, not the mesh: see
+//! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones and polyhedra; cells without a
+//! volume are left out beside them. How cells are split is in `cell_shapes` and `polyhedra`. Readers check the file, not the mesh: see
 //! [`tetralod::mesh::repair`]. Meshes in several files can be read one piece at a time: `Pieces`.
 
 #![warn(missing_docs)]
@@ -60,10 +61,12 @@ mod legacy;
 mod listed;
 mod memory;
 mod number;
+mod numbering;
 mod options;
 mod packed;
 mod payload;
 mod pieces;
+mod polyhedra;
 mod pvd;
 mod pvtu;
 mod raw;
@@ -72,6 +75,7 @@ mod shares;
 mod structured;
 mod surface;
 mod survey;
+mod tensors;
 mod time_steps;
 mod vtu;
 mod write;
@@ -97,7 +101,7 @@ pub use survey::{format_of, held_bytes, survey_raw};
 #[doc(hidden)]
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 #[doc(hidden)]
-pub use write::{PointArray, point_arrays};
+pub use write::{MeshArray, cell_arrays, point_arrays};
 pub use write::{write_vti, write_vtu};
 #[doc(hidden)]
 pub use write_layers::write_vti_layers;

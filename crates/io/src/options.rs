@@ -9,8 +9,8 @@ pub struct ReadOptions {
     /// Names of the fields to keep, a vector's name for all its components; all if none. Others are not decoded, and may be
     /// anything: see [`MeshInput::other_fields`](tetralod::mesh::MeshInput::other_fields).
     pub fields: Option<Vec<String>>,
-    /// Keep the first field beside those that are named, and none else if none are: the first at points, or at cells where points have
-    /// none.
+    /// Keep one field beside those that are named, and none else if none are: of those at points, or at cells where points have none, the
+    /// first that does not number something or say where it is. Of a vector it is the length, of a symmetric tensor von Mises' value.
     pub first: bool,
     /// What to do with fields at cells.
     pub cells: CellData,

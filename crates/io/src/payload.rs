@@ -132,6 +132,29 @@ fn truncated(needed: usize, found: usize) -> ReadReason {
     ReadReason::Truncated { needed: needed as u64, found: found as u64 }
 }
 
+/// How many bytes a block holds, as it says.
+pub(super) fn stated_bytes(mut source: Source<'_>, framing: Framing) -> Result<u64, ReadReason> {
+    let first = header_number(&mut source, framing)?;
+    if framing.compressor.is_none() {
+        return Ok(first);
+    }
+    let (_, total) = block_sizes(&mut source, framing, first)?;
+    Ok(total)
+}
+
+/// The bytes of each of so many compressed blocks, of the last one if it is smaller (else 0), and of all, unpacked.
+fn block_sizes(
+    source: &mut Source<'_>,
+    framing: Framing,
+    blocks: u64,
+) -> Result<([u64; 2], u64), ReadReason> {
+    let size = header_number(source, framing)?;
+    let last = header_number(source, framing)?;
+    let full = blocks.checked_sub(u64::from(last != 0));
+    let total = full.and_then(|n| n.checked_mul(size)).and_then(|n| n.checked_add(last));
+    Ok(([size, last], total.unwrap_or(u64::MAX)))
+}
+
 /// Reads one block that must hold exactly `needed` bytes.
 pub(super) fn read_block<'a>(
     mut source: Source<'a>,
@@ -144,12 +167,9 @@ pub(super) fn read_block<'a>(
         return source.take(needed);
     };
     let blocks = header_number(&mut source, framing)?;
-    let block_size = header_number(&mut source, framing)?;
-    let last_size = header_number(&mut source, framing)?;
+    let ([block_size, last_size], total) = block_sizes(&mut source, framing, blocks)?;
     let partial = u64::from(last_size != 0);
-    let full_blocks = blocks.checked_sub(partial);
-    let total = full_blocks.and_then(|n| n.checked_mul(block_size)).and_then(|n| n.checked_add(last_size));
-    expect_count("bytes of data", needed, total.unwrap_or(u64::MAX))?;
+    expect_count("bytes of data", needed, total)?;
     let mut sizes = Vec::new();
     for _ in 0..blocks {
         sizes.push(header_number(&mut source, framing)?);

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 use crate::beside::FilesOf;
 use crate::beside::load;
-use crate::cells::Numbering;
 use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::settle_unused;
 use crate::file_kind::without_mark;
 use crate::listed::for_each_file;
+use crate::numbering::Numbering;
 use crate::pvtu::{bits, numbered};
 use crate::vtu::{PieceReader, in_order};
 use crate::xml::Document;
@@ -187,8 +187,13 @@ impl Seen {
             let is_known = |point| self.several.binary_search(&hash(point)).is_ok();
             let known = |point| self.known.get(&bits(point)).filter(|_| is_known(point));
             (numbers, new) = numbered(points, self.points, |point| known(point).map(|(number, _)| *number))?;
-            Ok(Numbering::Each(numbers.clone()))
+            Ok(Numbering::Each { numbers: numbers.clone(), next: (self.points + new.len()) as u32 })
         })?;
+        // Those that cells got in reading.
+        for index in numbers.len()..mesh.positions.len() {
+            numbers.push((self.points + new.len()) as u32);
+            new.push(index);
+        }
         let place = || format!("piece {}, <PointData>", reader.number);
         match &self.fields {
             None => {

@@ -7,9 +7,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::cells::Numbering;
 use crate::error::{At, ReadError, ReadReason};
 use crate::listed::for_each_file;
+use crate::numbering::Numbering;
 use crate::vtu::{NumberPoints, first_number, join, readers};
 use crate::xml::Document;
 use crate::{Beside, ReadOptions};
@@ -54,12 +54,15 @@ impl Whole {
     ) -> Result<(), ReadError> {
         let first = self.mesh.positions.len();
         // The points that no earlier piece has.
-        let mut new = Vec::new();
+        let (mut new, mut count) = (Vec::new(), 0);
         let mut part = read(&mut |points| {
             let numbers;
             (numbers, new) = numbered(points, first, |point| self.known.get(&bits(point)).copied())?;
-            Ok(Numbering::Each(numbers))
+            count = points.len();
+            Ok(Numbering::Each { numbers, next: (first + new.len()) as u32 })
         })?;
+        // Those that cells got in reading.
+        new.extend(count..part.positions.len());
         keep(&mut part.positions, &new);
         part.fields.iter_mut().for_each(|field| keep(&mut field.values, &new));
         for (number, (at, point)) in (first as u32..).zip(part.positions.iter().enumerate()) {

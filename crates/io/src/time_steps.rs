@@ -4,14 +4,15 @@ use std::collections::HashSet;
 
 use thiserror::Error;
 
+use crate::fields::tell;
 use crate::{CellData, ReadError, ReadOptions};
 use tetralod::geom::bits_of;
-use tetralod::mesh::{Field, GeometryField, StepError, TetMesh};
+use tetralod::mesh::{Field, GeometryField, StepError, TetMesh, default_field};
 
 /// Which fields of the files of a mesh are wanted.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldSelection<'a> {
-    /// Names of fields, a vector's for its components; the first field if there are none and not all are wanted.
+    /// Names of fields, a vector's for its components; if there are none and not all are wanted, [that which tells something](ReadOptions::first).
     pub names: &'a [String],
     /// All fields.
     pub all: bool,
@@ -103,17 +104,13 @@ fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>
     let is_named =
         |field: &Field| wanted.names.iter().chain(wanted.labels).any(|name| field.answers_to(name));
     if wanted.names.is_empty() && !wanted.all {
-        let first = |fields: &mut Vec<Field>, count: usize| {
-            let mut at = 0;
-            fields.retain(|field| {
-                at += 1;
-                at <= count || is_named(field)
-            });
-        };
-        // Where points have no field, the first one comes from the cells.
-        let at_points = usize::from(!mesh.fields.is_empty());
-        first(&mut mesh.fields, at_points);
-        first(&mut mesh.cell_fields, 1 - at_points);
+        // Where points have no field that tells something, that of the cells is shown.
+        let at_points = default_field(&mesh.fields, wanted.labels);
+        let at_cells = default_field(&mesh.cell_fields, wanted.labels).filter(|_| !tell(&mesh.fields));
+        for (fields, shown) in [(&mut mesh.fields, at_points), (&mut mesh.cell_fields, at_cells)] {
+            let name = shown.map(|shown| fields[shown].name.clone());
+            fields.retain(|field| Some(&field.name) == name.as_ref() || is_named(field));
+        }
     } else if !wanted.all {
         mesh.fields.retain(is_named);
         mesh.cell_fields.retain(is_named);

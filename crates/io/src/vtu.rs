@@ -1,11 +1,13 @@
 //! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces. What has vertices alone as cells is a mesh of
 //! points without tetrahedra.
 
-use crate::cells::{CellList, Numbering};
+use crate::cells::CellList;
 use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
 use crate::number::points_from;
+use crate::numbering::Numbering;
+use crate::polyhedra::{self, FaceLists, SharedFaces};
 use crate::xml::{Array, Document, Piece};
 use crate::{CellData, ReadOptions, Survey, cell_types, cells};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
@@ -83,8 +85,8 @@ impl PieceReader<'_, '_> {
         if let (Some(listed), Some(ghosts)) = (&mut listed, self.ghosts("PointData", points)?) {
             listed.hide(&ghosts.iter().map(|flags| flags & HIDDEN_POINT != 0).collect::<Vec<_>>());
         }
-        let positions = self.points(points)?;
-        let [fields, other_fields] = self.fields("PointData", points)?;
+        let mut positions = self.points(points)?;
+        let [mut fields, other_fields] = self.fields("PointData", points)?;
         let used = || listed.as_ref().map(|listed| listed.used(points));
         check_finite(&positions, &fields, &used).at(place)?;
         // Where all cells were left out, so is what is known of them.
@@ -100,7 +102,9 @@ impl PieceReader<'_, '_> {
             }
         };
         let numbering = numbers(&positions).at(place)?;
-        let split = listed.map(|listed| listed.split(&numbering, &self.options.memory)).transpose();
+        let memory = &self.options.memory;
+        let split =
+            listed.map(|listed| listed.split(&numbering, &mut positions, &mut fields, memory)).transpose();
         let split = split.at(|| format!("{}, <Cells>, array \"connectivity\"", place()))?.unwrap_or_default();
         split.spread(&mut cell_fields);
         let mut input = MeshInput { other_fields, other_cell_fields, ..split.input };
@@ -173,12 +177,7 @@ impl PieceReader<'_, '_> {
         if cells == 0 {
             return Ok(Some(CellList::default()));
         }
-        let find = |name: &str| -> Result<&Array<'_>, ReadError> {
-            let found = self.piece.section("Cells").find(|a| a.name() == name);
-            let missing = || ReadReason::Missing(format!("array \"{name}\" of <Cells>"));
-            found.ok_or_else(missing).at(|| self.place())
-        };
-        let types = find("types")?;
+        let types = self.of_cells("types")?;
         // Types and ends.
         self.expect_numbers(cells.saturating_mul(2)).at(|| types.place())?;
         let mut kinds = self.document.integers(types, cells).at(|| types.place())?;
@@ -186,7 +185,7 @@ impl PieceReader<'_, '_> {
             return Ok(None);
         }
         cells::most_tets(&kinds).at(|| types.place())?;
-        let offsets = find("offsets")?;
+        let offsets = self.of_cells("offsets")?;
         let ends = self.document.integers(offsets, cells).at(|| offsets.place())?;
         let is_old = self.document.is_before([2, 1]);
         let swapped =
@@ -194,10 +193,14 @@ impl PieceReader<'_, '_> {
         cells::resolve_orders(&mut kinds, &ends);
         cells::most_tets(&kinds).at(|| types.place())?;
         let length = cells::checked_ends(&kinds, &ends).at(|| offsets.place())?;
-        let connectivity = find("connectivity")?;
+        let connectivity = self.of_cells("connectivity")?;
         self.expect_numbers(length).at(|| connectivity.place())?;
         let list = self.document.indices(connectivity, length).at(|| connectivity.place())?;
         let mut list = CellList { types: kinds, ends, connectivity: list };
+        if list.types.contains(&cell_types::POLYHEDRON) {
+            let faces = self.faces(cells)?;
+            list = list.with_faces(&faces).at(|| format!("{}, <Cells>", self.place()))?;
+        }
         if let Some(swapped) = swapped {
             list.order_as_before_9(swapped);
         }
@@ -205,6 +208,40 @@ impl PieceReader<'_, '_> {
             list.leave_out(&ghosts);
         }
         Ok(Some(list))
+    }
+
+    /// An array of <Cells>.
+    fn of_cells(&self, name: &str) -> Result<&Array<'_>, ReadError> {
+        let found = self.piece.section("Cells").find(|a| a.name() == name);
+        let missing = || ReadReason::Missing(format!("array \"{name}\" of <Cells>"));
+        found.ok_or_else(missing).at(|| self.place())
+    }
+
+    /// The faces of polyhedra, in the arrays that VTK writes since version 9.4, or in the older ones.
+    fn faces(&self, cells: usize) -> Result<FaceLists, ReadError> {
+        let numbers = |name: &str, count: Option<usize>| {
+            let array = self.of_cells(name)?;
+            let numbers = || {
+                let count = count.map_or_else(|| self.document.count_of(array), Ok)?;
+                self.expect_numbers(count)?;
+                self.document.integers(array, count)
+            };
+            numbers().at(|| array.place())
+        };
+        let is_new = self.piece.section("Cells").any(|array| array.name() == "polyhedron_to_faces");
+        if !is_new {
+            return Ok(FaceLists {
+                numbers: numbers("faces", None)?,
+                ends: numbers("faceoffsets", Some(cells))?,
+            });
+        }
+        let faces = SharedFaces {
+            connectivity: numbers("face_connectivity", None)?,
+            ends: numbers("face_offsets", None)?,
+            of_cells: numbers("polyhedron_to_faces", None)?,
+            cell_ends: numbers("polyhedron_offsets", Some(cells))?,
+        };
+        faces.lists().at(|| format!("{}, <Cells>", self.place()))
     }
 
     /// Checks that there is room for so many numbers, unpacked and decoded, which are at most eight bytes each.
@@ -220,15 +257,18 @@ impl PieceReader<'_, '_> {
             return Ok(0);
         };
         let mut kinds = self.document.integers(types, cells).at(|| types.place())?;
+        let mut polyhedra = 0;
         if cells::depend_on_points(&kinds)
             && let Some(offsets) = self.piece.section("Cells").find(|a| a.name() == "offsets")
         {
-            cells::resolve_orders(
-                &mut kinds,
-                &self.document.integers(offsets, cells).at(|| offsets.place())?,
-            );
+            let ends = self.document.integers(offsets, cells).at(|| offsets.place())?;
+            cells::resolve_orders(&mut kinds, &ends);
+            polyhedra = polyhedra::most_tets(&kinds, &ends);
         }
-        if cells::are_points(&kinds) { Ok(0) } else { cells::most_tets(&kinds).at(|| types.place()) }
+        if cells::are_points(&kinds) {
+            return Ok(0);
+        }
+        Ok(cells::most_tets(&kinds).at(|| types.place())?.saturating_add(polyhedra))
     }
 
     /// The flags by which VTK marks points or cells that are hidden, or another piece's, if there are any.

@@ -32,9 +32,10 @@ pub fn write_vtu(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
     let ends: Vec<i64> = (1..=mesh.tets.len() as i64).map(|i| 4 * i).collect();
     let offsets = data.append(&ends, i64::to_le_bytes)?;
     let types = data.append(&vec![TETRAHEDRON; mesh.tets.len()], |v| [v])?;
+    let of_cells = cell_data(mesh, &mut data)?;
     let body = format!(
         "{}    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{arrays}\
-         \x20     <Points>\n{}      </Points>\n      <Cells>\n{}{}{}      </Cells>\n    </Piece>\n",
+         {of_cells}      <Points>\n{}      </Points>\n      <Cells>\n{}{}{}      </Cells>\n    </Piece>\n",
         field_data(mesh),
         mesh.positions.len(),
         mesh.tets.len(),
@@ -97,37 +98,52 @@ pub(super) fn write_head(kind: &str, attributes: &str, body: &str, out: &mut imp
     )
 }
 
-/// An array of values at the points of a mesh, as files have it: a field, or the components of a vector.
+/// An array of values at the points or the cells of a mesh, as files have it: a field, or the components of a vector.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PointArray<'a> {
+pub struct MeshArray<'a> {
     /// The name of the array, with the time where there are several steps of it.
     pub name: String,
     /// The field, or one for each component.
     pub components: &'a [Field],
 }
 
-impl PointArray<'_> {
-    /// The values, those of a point one behind the other.
+impl MeshArray<'_> {
+    /// The values, those of a point or cell one behind the other.
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         let points = self.components.first().map_or(0, |field| field.values.len());
         (0..points).flat_map(|i| self.components.iter().map(move |field| field.values[i]))
     }
 }
 
-/// The fields of a mesh as arrays. Components that follow one another become a vector again, and its length, which follows from
+/// The fields of a mesh at its points as arrays. Components that follow one another become a vector again, and its length, which follows from
 /// them, is left out.
 ///
 /// # Errors
 /// With [`io::ErrorKind::InvalidInput`] if a field is not as long as there are points.
-pub fn point_arrays(mesh: &TetMesh) -> io::Result<Vec<PointArray<'_>>> {
-    let points = mesh.positions.len();
-    if let Some(Field { name, values, .. }) = mesh.fields.iter().find(|f| f.values.len() != points) {
-        let problem = format!("field \"{name}\" has {} values for {points} points", values.len());
+pub fn point_arrays(mesh: &TetMesh) -> io::Result<Vec<MeshArray<'_>>> {
+    arrays(&mesh.fields, (mesh.positions.len(), "points"))
+}
+
+/// [`point_arrays`] of its fields at cells, but for those that are known by their names alone.
+///
+/// # Errors
+/// With [`io::ErrorKind::InvalidInput`] if a field is not as long as there are cells.
+pub fn cell_arrays(mesh: &TetMesh) -> io::Result<Vec<MeshArray<'_>>> {
+    let of_one_kind = mesh.cell_fields.chunk_by(|a, b| a.values.is_empty() == b.values.is_empty());
+    let with_values = of_one_kind.filter(|fields| !fields[0].values.is_empty());
+    let lists = with_values.map(|fields| arrays(fields, (mesh.tets.len(), "cells")));
+    Ok(lists.collect::<io::Result<Vec<_>>>()?.concat())
+}
+
+/// Fields as arrays, which are so long.
+fn arrays<'a>(fields: &'a [Field], (count, of): (usize, &str)) -> io::Result<Vec<MeshArray<'a>>> {
+    if let Some(Field { name, values, .. }) = fields.iter().find(|f| f.values.len() != count) {
+        let problem = format!("field \"{name}\" has {} values for {count} {of}", values.len());
         return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
     let mut arrays = Vec::new();
     let mut vectors: Vec<(&str, Option<f64>)> = Vec::new();
-    let mut rest = mesh.fields.as_slice();
+    let mut rest = fields;
     while let Some(first) = rest.first() {
         let (components, behind) = rest.split_at(components(rest));
         rest = behind;
@@ -140,7 +156,7 @@ pub fn point_arrays(mesh: &TetMesh) -> io::Result<Vec<PointArray<'_>>> {
             Some(vector) if is_length(first) && vectors.contains(&(vector, first.time)) => continue,
             _ => &first.name,
         };
-        arrays.push(PointArray { name: name_at_time(mesh, first, name), components });
+        arrays.push(MeshArray { name: name_at_time(fields, first, name), components });
     }
     Ok(arrays)
 }
@@ -152,6 +168,16 @@ fn point_data(mesh: &TetMesh, data: &mut Appended) -> io::Result<String> {
     let scalars = scalars.map(|array| format!(" Scalars=\"{}\"", escaped(&array.name))).unwrap_or_default();
     let elements = arrays.iter().map(|array| element(array, data)).collect::<io::Result<String>>()?;
     Ok(format!("      <PointData{scalars}>\n{elements}      </PointData>\n"))
+}
+
+/// The element `<CellData>`; nothing if there are no arrays.
+fn cell_data(mesh: &TetMesh, data: &mut Appended) -> io::Result<String> {
+    let arrays = cell_arrays(mesh)?;
+    if arrays.is_empty() {
+        return Ok(String::new());
+    }
+    let elements = arrays.iter().map(|array| element(array, data)).collect::<io::Result<String>>()?;
+    Ok(format!("      <CellData>\n{elements}      </CellData>\n"))
 }
 
 fn is_length(field: &Field) -> bool {
@@ -173,8 +199,8 @@ fn components(fields: &[Field]) -> usize {
 }
 
 /// A name for one of several time steps.
-fn name_at_time(mesh: &TetMesh, field: &Field, name: &str) -> String {
-    let several = mesh.fields.iter().any(|f| f.name == field.name && f.time != field.time);
+fn name_at_time(fields: &[Field], field: &Field, name: &str) -> String {
+    let several = fields.iter().any(|f| f.name == field.name && f.time != field.time);
     match field.time {
         Some(time) if several => format!("{name}@{time:?}"),
         _ => name.to_owned(),
@@ -182,7 +208,7 @@ fn name_at_time(mesh: &TetMesh, field: &Field, name: &str) -> String {
 }
 
 /// The element of an array, its values appended to `data`.
-fn element(array: &PointArray<'_>, data: &mut Appended) -> io::Result<String> {
+fn element(array: &MeshArray<'_>, data: &mut Appended) -> io::Result<String> {
     let fields = array.components;
     let values: Vec<f64> = array.values().collect();
     // Integers beyond this were rounded when they were read.

@@ -239,7 +239,17 @@ impl<'a> Document<'a> {
         self.values(array, count, 1, NumberType::parse_integer, NumberType::integers)
     }
 
-    /// The same, decoded later if they are numbers already.
+    /// How many numbers an array has, where nothing else says it.
+    pub fn count_of(&self, array: &Array<'a>) -> Result<usize, ReadReason> {
+        if array.encoding() == Encoding::Ascii {
+            return Ok(array.text.split_ascii_whitespace().count());
+        }
+        let size = array.number_type().map_or(1, NumberType::size) as u64;
+        let bytes = payload::stated_bytes(self.source(array)?, self.framing)?;
+        usize::try_from(bytes / size).map_err(|_| endless(array))
+    }
+
+    /// The values of an array of `count` indices, decoded later if they are numbers already.
     pub fn indices<'b>(&'b self, array: &'b Array<'a>, count: usize) -> Result<Indices<'b>, ReadReason> {
         let number = array.number_type().filter(|number| number.is_integer());
         let (Some(number), true) = (number, count > 0 && array.encoding() != Encoding::Ascii) else {

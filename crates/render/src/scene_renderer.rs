@@ -4,7 +4,7 @@ use crate::gpu::{GpuError, Renderer, SideTarget, TextureView};
 use crate::scene::{Legend, Scene, SceneError, SceneState, Update};
 use tetralod::Coded;
 use tetralod::geom::{Bounds, Camera, Ray};
-use tetralod::session::Session;
+use tetralod::session::{Deformation, Session};
 use thiserror::Error;
 
 /// Shows a session's mesh: a [`Scene`] says what is to be drawn of it, a [`Renderer`] draws that.
@@ -93,9 +93,32 @@ impl SceneRenderer {
         self.scene.set_pixel_ratio(ratio);
     }
 
+    /// As [`Scene::shown_regions`].
+    ///
+    /// # Errors
+    /// If there is no such region.
+    pub fn shown_regions(&self, session: &Session) -> Result<Option<Vec<u16>>, SceneError> {
+        self.scene.shown_regions(session)
+    }
+
     /// As [`Scene::bounds`].
     pub fn bounds(&self) -> Option<&Bounds> {
         self.scene.bounds()
+    }
+
+    /// As [`Scene::shown_bounds`].
+    pub fn shown_bounds(&self, session: &Session) -> Option<Bounds> {
+        self.scene.shown_bounds(session)
+    }
+
+    /// As [`Scene::deformation`].
+    pub fn deformation(&self) -> Option<&Deformation> {
+        self.scene.deformation()
+    }
+
+    /// As [`Scene::shown`].
+    pub fn shown(&self, session: &mut Session, point: [f64; 3]) -> Option<[f64; 3]> {
+        self.scene.shown(session, point)
     }
 
     /// As [`Scene::legend`].

@@ -14,8 +14,9 @@ use tetralod::Coded;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Bounds;
 use tetralod::mesh::{
-    self, Field, GeometryField, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh,
+    self, COMPONENTS, Field, GeometryField, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh,
 };
+use tetralod::mt::{AveragedField, MultiTessellation};
 use tetralod_build::{self as builder, BuildConfig, BuildError, BuildProgress, BuildSummary, Remedy};
 use tetralod_io::{
     self as io, CellData, FieldSelection, MemoryLimit, ReadError, ReadOptions, Survey, read_time_steps,
@@ -200,6 +201,13 @@ impl MeshBuilder {
             let known = all.map(|field| field.name.clone()).collect();
             return Err(refused(&BuildError::UnknownField { name: name.clone(), known }));
         }
+        let all = || survey.fields.iter().chain(&survey.cell_fields);
+        for name in &config.preserve {
+            if name != COMPONENTS && !all().any(|field| field.name == *name) {
+                let known = all().map(|field| field.name.clone()).collect();
+                return Err(refused(&BuildError::UnknownLabel { name: name.clone(), known }));
+            }
+        }
         Ok(())
     }
 
@@ -218,9 +226,7 @@ impl MeshBuilder {
             let found = mesh::findings(&mesh, level.weld_distance()).map_err(bad_mesh)?;
             (mesh, Some((done, RepairObject::of(level, &done, &found))))
         };
-        if cells {
-            mesh.cells_to_points();
-        }
+        mesh.settle_cells(cells, &config.preserve);
         mesh.add_geometry_fields(&config.fields);
         set_units(&mut mesh, &units)?;
         let built = builder::build_with(mesh, &config, &mut |step| stages.step(&step));
@@ -232,7 +238,8 @@ impl MeshBuilder {
         let bytes = encode(&built.mt, &encoding)?;
         let (repaired, repair) =
             repaired.map_or_else(Default::default, |(done, repair)| (done.to_string(), Some(repair)));
-        Ok(result(&bytes, &config, &built.summary, &repaired, repair, &notes))
+        let said = Said { repaired, repair, notes, averaged: built.mt.info().averaged_fields() };
+        Ok(result(&bytes, &config, &built.summary, said))
     }
 
     /// The mesh as the files have it. Each file is dropped when it was read.
@@ -246,8 +253,9 @@ impl MeshBuilder {
         let steps: Vec<_> = files.iter().map(|file| (file.name.clone(), None)).collect();
         let mut files: Vec<_> = files.into_iter().map(Some).collect();
         let total = steps.len() as u64;
-        let cells = if cells { CellData::Values } else { CellData::Names };
-        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, labels: &[], cells };
+        let cells = if cells || !config.preserve.is_empty() { CellData::Values } else { CellData::Names };
+        let labels = &config.preserve;
+        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, labels, cells };
         let memory = MemoryLimit::of(self.memory);
         let mut read = |number: usize, options: &ReadOptions| {
             let options = &ReadOptions { memory: memory.clone(), ..options.clone() };
@@ -397,6 +405,7 @@ struct ReportObject<'a> {
     repaired: &'a str,
     repair: Option<RepairObject>,
     notes: &'a [String],
+    averaged: &'a [AveragedField],
 }
 
 #[derive(Serialize)]
@@ -443,13 +452,19 @@ impl RepairObject {
     }
 }
 
+/// What is said of how the input was taken.
+struct Said {
+    repaired: String,
+    repair: Option<RepairObject>,
+    notes: Vec<String>,
+    averaged: Vec<AveragedField>,
+}
+
 fn result(
     bytes: &[u8],
     config: &BuildConfig,
     summary: &BuildSummary,
-    repaired: &str,
-    repair: Option<RepairObject>,
-    notes: &[String],
+    Said { repaired, repair, notes, averaged }: Said,
 ) -> JsBuilt {
     let construction = config.construction;
     let report = object(&ReportObject {
@@ -463,9 +478,10 @@ fn result(
         updates: summary.updates,
         depth: summary.depth,
         position_bits: summary.position_bits,
-        repaired,
+        repaired: &repaired,
         repair,
-        notes,
+        notes: &notes,
+        averaged: &averaged,
     });
     let built = Object::new();
     for (name, value) in [("bytes", Uint8Array::from(bytes).into()), ("report", report)] {

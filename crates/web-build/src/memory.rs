@@ -51,5 +51,7 @@ fn fields(survey: &Survey, options: &BuildOptions) -> u64 {
         () if config.fields.is_empty() => 1,
         () => all.filter(|field| config.fields.iter().any(|name| field.answers_to(name))).count(),
     };
-    wanted.max(1) as u64
+    // Labels have a value for each cell.
+    let labels = config.preserve.len() * survey.cells.div_ceil(survey.points.max(1)) as usize;
+    (wanted.max(1) + labels) as u64
 }

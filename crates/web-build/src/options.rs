@@ -13,7 +13,7 @@ use tetralod_web_options::read_error::ReadError;
 use wasm_bindgen::JsValue;
 
 /// The names of all options.
-const NAMES: [&str; 22] = [
+const NAMES: [&str; 24] = [
     "kind",
     "method",
     "criterion",
@@ -35,6 +35,8 @@ const NAMES: [&str; 22] = [
     "displacementEdges",
     "minDihedral",
     "featureAngle",
+    "preserve",
+    "preserveWithin",
     "blockUpdates",
 ];
 
@@ -99,8 +101,10 @@ fn read(given: &Given, construction: Construction, default: BuildConfig) -> Resu
             .unwrap_or(default.displacement_edges),
         min_dihedral: given.number_in("minDihedral", 0.0..=70.0, "0 to 70 degrees")?,
         feature_angle: given.number_in("featureAngle", 1.0..=90.0, "1 to 90 degrees")?,
-        preserve: Vec::new(),
-        preserve_within: default.preserve_within,
+        preserve: given.texts("preserve")?,
+        preserve_within: given
+            .number_in("preserveWithin", 0.0..=f64::MAX, "a length that is not negative")?
+            .unwrap_or(default.preserve_within),
         keep_points: Vec::new(),
         block_bits: block_bits(given)?.unwrap_or(default.block_bits),
     };

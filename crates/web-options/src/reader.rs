@@ -47,6 +47,9 @@ impl serde::de::Error for ReadError {
     }
 }
 
+/// Whole numbers up to this one are exact in JavaScript.
+const EXACT: f64 = 9_007_199_254_740_991.0;
+
 /// A value that is read.
 pub struct Reader(JsValue);
 
@@ -78,7 +81,9 @@ impl<'de> Deserializer<'de> for Reader {
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
         if let Some(number) = self.0.as_f64() {
-            return visitor.visit_f64(number);
+            // Where a number may stand beside other types, a whole one is an integer.
+            let is_whole = number.fract() == 0.0 && number.abs() <= EXACT;
+            return if is_whole { visitor.visit_i64(number as i64) } else { visitor.visit_f64(number) };
         }
         if let Some(text) = self.0.as_string() {
             return visitor.visit_string(text);

@@ -254,6 +254,7 @@ impl Viewer {
     /// Sets the request, for `step` to make its mesh. Views without a matrix follow the camera.
     pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
         let (seen, before) = (self.view(), self.file.asked.field);
+        self.file.regions = self.scene.shown_regions(&self.file.session)?;
         self.file.request(options, Some(&seen))?;
         (self.seen, self.moving) = (seen, true);
         if self.file.asked.field != before {
@@ -302,6 +303,11 @@ impl Viewer {
         // What fails would fail again: it is not tried before something else is asked for.
         self.moving = false;
         self.follow_camera()?;
+        let shown = self.scene.shown_regions(&self.file.session)?;
+        if shown != self.file.regions {
+            self.file.regions = shown;
+            self.file.request_again()?;
+        }
         let stats = self.file.step(milliseconds, f64::INFINITY)?;
         self.moving = !stats.done;
         self.is_stale |= stats.refined + stats.coarsened > 0;
@@ -318,9 +324,21 @@ impl Viewer {
     #[wasm_bindgen(js_name = setScene)]
     pub fn set_scene(&mut self, state: &JsScene) -> Result<(), WebError> {
         let state: SceneState = read(state).map_err(|error| error.with_value(state))?;
+        let is_behind = state.regions != self.scene.state().regions;
         self.scene.set_state(state)?;
+        // What is displaced may leave the box of the model.
+        if let Some(bounds) = self.shown_bounds() {
+            self.camera.set_model(&bounds);
+        }
         self.is_stale = true;
+        // What is not shown is not asked for.
+        self.moving |= is_behind && self.file.session.info().is_some();
         Ok(())
+    }
+
+    /// The box that all is shown in; none until the base mesh is there.
+    fn shown_bounds(&self) -> Option<Bounds> {
+        self.scene.shown_bounds(&self.file.session)
     }
 
     /// Where the camera is.
@@ -381,6 +399,8 @@ impl Viewer {
         let fields = &session.info().ok_or_else(WebError::not_ready)?.fields;
         let now = fields[session.field()].time;
         let by_name: JsValue = object(&[]);
+        let own = reading.region.and_then(|number| session.regions()?.all.get(usize::from(number)));
+        let name = own.map(|region| region.name.as_str());
         // Of the time steps of a field that which is shown counts, or the first.
         let all = || fields.iter().zip(&reading.values).rev();
         for (field, value) in all().chain(all().filter(|(field, _)| field.time == now)) {
@@ -389,7 +409,9 @@ impl Viewer {
         Ok(Some(object(&[
             ("position", list(&reading.position)),
             ("values", by_name),
+            ("all", list(&reading.values)),
             ("tet", reading.tet.into()),
+            ("region", name.map_or(JsValue::UNDEFINED, |name| name.into())),
             ("size", reading.size.into()),
             ("error", reading.error.into()),
         ])))
@@ -451,9 +473,9 @@ impl Viewer {
 
     /// Shows the whole model from the front.
     pub fn home(&mut self) {
-        let bounds = self.scene.bounds().unwrap_or(&Bounds::EMPTY);
+        let bounds = self.shown_bounds().unwrap_or(Bounds::EMPTY);
         let projection = self.camera.projection();
-        self.camera = Camera::home(bounds, self.aspect());
+        self.camera = Camera::home(&bounds, self.aspect());
         self.camera.set_projection(projection);
         self.is_stale = true;
     }
@@ -467,7 +489,7 @@ impl Viewer {
             return Err(WebError::bad_option("side", &format!("must be one of {names}; given: {side}")));
         };
         self.home();
-        let bounds = *self.scene.bounds().unwrap_or(&Bounds::EMPTY);
+        let bounds = self.shown_bounds().unwrap_or(Bounds::EMPTY);
         self.camera.turn_to(*preset);
         self.camera.fit(&bounds, self.aspect());
         Ok(())

@@ -31,11 +31,15 @@ impl Viewer {
         let edges = self.tick_edges.into_iter().flatten();
         let axes = edges.filter_map(|edge| box_axis(edge, &bounds, &camera, aspect, spacing));
         let everywhere = camera.projection() == Projection::Orthographic;
+        let deformation = self.scene.deformation().map_or(JsValue::UNDEFINED, |deformation| {
+            object(&[("factor", deformation.factor.into()), ("part", deformation.part.into())])
+        });
         Some(object(&[
             ("axes", objects(axes.map(axis))),
             ("scaleBar", bar(scale_bar(&camera, aspect), everywhere)),
             ("rotation", objects(directions.iter().map(|direction| list(&direction.to_array())))),
             ("matrix", list(&self.view().matrix)),
+            ("deformation", deformation),
         ]))
     }
 }

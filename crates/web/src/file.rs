@@ -31,6 +31,8 @@ pub struct File {
     pub asked: Asked,
     /// A budget of tetrahedra besides that of the request.
     limit: Option<u32>,
+    /// The regions in which needs count that name none.
+    pub regions: Option<Vec<u16>>,
 }
 
 impl File {
@@ -84,7 +86,8 @@ impl File {
 
     /// What `options` ask for; `camera` is the one of the viewer, if there is one.
     pub fn request(&mut self, options: &JsValue, camera: Option<&View>) -> Result<(), WebError> {
-        let asked = asked(options, self.info()?, camera)?;
+        let mt = self.session.mt().ok_or_else(WebError::not_ready)?;
+        let asked = asked(options, mt, camera)?;
         self.session.request_with(&self.limited(&asked.request), &asked.custom)?;
         self.session.set_field(asked.field)?;
         self.asked = asked;
@@ -99,6 +102,11 @@ impl File {
     fn limited(&self, request: &Request) -> Request {
         let mut request = request.clone();
         request.budget.tets = request.budget.tets.into_iter().chain(self.limit).min();
+        if let Some(regions) = &self.regions {
+            for need in request.needs.iter_mut().filter(|need| need.regions.is_none()) {
+                need.regions = Some(regions.clone());
+            }
+        }
         request
     }
 

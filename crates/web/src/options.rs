@@ -1,13 +1,11 @@
 //! What JavaScript asks for, checked: every refusal names the option.
 
 use crate::callback::Callback;
-use js_sys::Function;
+use js_sys::{Array, Function};
 use std::sync::Arc;
 use tetralod::geom::Bounds;
-use tetralod::mt::MtInfo;
-use tetralod::refine::{
-    Budget, Criterion, Inside, Need, Part, Region, Request, RequestError, Transfer, View,
-};
+use tetralod::mt::{Mt, MtInfo, MultiTessellation, Regions, numbers_of};
+use tetralod::refine::{Budget, Criterion, Inside, Need, Region, Request, RequestError, Transfer, View};
 use tetralod_web_options::error::WebError;
 use tetralod_web_options::given::Given;
 use tetralod_web_options::read_error::ReadError;
@@ -25,7 +23,7 @@ extern "C" {
 }
 
 /// The options of a need and behind them those of a whole request, as refusals list them.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 19] = [
     "error",
     "field",
     "box",
@@ -36,6 +34,7 @@ const NAMES: [&str; 18] = [
     "planes",
     "isovalues",
     "ranges",
+    "regions",
     "view",
     "transfer",
     "needs",
@@ -47,7 +46,7 @@ const NAMES: [&str; 18] = [
 ];
 
 /// Those of them that a need has.
-const NEED: usize = 12;
+const NEED: usize = 13;
 
 /// Those of a need that limit it, in the order in which refusals name them.
 const LIMITS: [&str; 11] = [
@@ -78,13 +77,14 @@ pub struct Asked {
     pub follows: Vec<usize>,
 }
 
-/// What `options` ask for, of the MT of `info`. `own` is the viewer's camera, for views that name none.
-pub fn asked(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Asked, WebError> {
-    parse(options, info, own).map_err(|error| error.with_value(options).into())
+/// What `options` ask for, of an MT. `own` is the viewer's camera, for views that name none.
+pub fn asked(options: &JsValue, mt: &Mt, own: Option<&View>) -> Result<Asked, WebError> {
+    parse(options, mt, own).map_err(|error| error.with_value(options).into())
 }
 
-fn parse(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Asked, ReadError> {
-    let mut parser = Parser { info, own, asked: Asked::default() };
+fn parse(options: &JsValue, mt: &Mt, own: Option<&View>) -> Result<Asked, ReadError> {
+    let info = mt.info();
+    let mut parser = Parser { info, regions: mt.regions(), own, asked: Asked::default() };
     if options.is_undefined() || options.is_null() {
         parser.asked.request = parser.of_field(Need::within(0.0), 0).into();
         parser.asked.units.push(info.fields[0].range());
@@ -94,7 +94,8 @@ fn parse(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Asked, 
     let needs = all.each("needs", &NAMES[..NEED])?;
     parser.asked.field = parser.field(&all)?.unwrap_or(0);
     // A field alone is no need: it says which one is shown.
-    if !all.has("needs") && !all.has("where") || LIMITS.iter().any(|name| all.has(name)) {
+    if !all.has("needs") && !all.has("where") || LIMITS.iter().any(|name| all.has(name)) || all.has("regions")
+    {
         parser.need(&all)?;
     }
     for need in &needs {
@@ -220,8 +221,24 @@ fn ranges(need: &Given) -> Result<Vec<[f64; 2]>, ReadError> {
 /// Needs as they are found.
 struct Parser<'a> {
     info: &'a MtInfo,
+    regions: Option<&'a Regions>,
     own: Option<&'a View>,
     asked: Asked,
+}
+
+/// The regions that are named, by their names or labels.
+fn region_numbers(need: &Given, regions: Option<&Regions>) -> Result<Option<Vec<u16>>, ReadError> {
+    let Some(names) = need.member("regions") else { return Ok(None) };
+    let refuse = |problem: &str| need.refuse("regions", problem);
+    if !Array::is_array(&names) {
+        return Err(refuse("must be a list of names or labels"));
+    }
+    let word = |name: JsValue| {
+        let label = || name.as_f64().filter(|label| label.fract() == 0.0).map(|x| (x as i64).to_string());
+        name.as_string().or_else(label).ok_or_else(|| refuse("must be a list of names or labels"))
+    };
+    let names = Array::from(&names).iter().map(word).collect::<Result<Vec<_>, _>>()?;
+    numbers_of(regions, &names).map(Some).map_err(|(_, problem)| refuse(&problem))
 }
 
 impl Parser<'_> {
@@ -249,6 +266,17 @@ impl Parser<'_> {
 
     /// The need that `options` describe.
     fn need(&mut self, options: &Given) -> Result<(), ReadError> {
+        let first = self.asked.request.needs.len();
+        self.need_anywhere(options)?;
+        if let Some(regions) = region_numbers(options, self.regions)? {
+            self.asked.request.needs[first..]
+                .iter_mut()
+                .for_each(|need| need.regions = Some(regions.clone()));
+        }
+        Ok(())
+    }
+
+    fn need_anywhere(&mut self, options: &Given) -> Result<(), ReadError> {
         let field = self.field(options)?.unwrap_or(self.asked.field);
         if let Some(view) = options.inside("view", &["matrix", "viewport", "pixels", "outside"])? {
             stands_alone(options, "view", &[])?;
@@ -281,8 +309,8 @@ impl Parser<'_> {
         let unit_length = transfer.number("unitLength")?.unwrap_or(1.0);
         let error = options.error("error", 1.0)?.unwrap_or(0.0);
         let points = points.into_iter().map(|[value, r, g, b, a]| (value, [r, g, b, a])).collect();
-        let part = Part::Transfer(Transfer { field, points, unit_length });
-        self.push(options, "transfer", Need { error, field: None, part }, 1.0)
+        let transfer = Transfer { field, points, unit_length };
+        self.push(options, "transfer", Need::shown(transfer, error), 1.0)
     }
 
     fn view(&mut self, view: &Given, field: usize) -> Result<(), ReadError> {

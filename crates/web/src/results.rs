@@ -4,10 +4,11 @@ use crate::arrays::{doubles, integers, list, object, objects, record, set};
 use crate::options::Asked;
 use crate::stored::Stored;
 use tetralod::geom::Bounds;
-use tetralod::mt::{FieldInfo, MtInfo};
+use tetralod::mesh::{Averaged, Extreme, Extremes, NONE};
+use tetralod::mt::{FieldInfo, MtInfo, Regions};
 use tetralod::refine::RefineStats;
 use tetralod::session::{BlockProgress, Progress, Session};
-use tetralod::view::MeshView;
+use tetralod::view::{MeshView, region_color};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -70,13 +71,33 @@ pub fn info(session: &Session) -> Option<JsInfo> {
         ("tetrahedra", info.tetrahedra.into()),
         ("updates", info.updates.into()),
         ("exactValues", session.decoder().exact_status().name().into()),
+        ("regions", session.regions().map_or(JsValue::UNDEFINED, |all| regions(all, info))),
         ("isBox", session.is_box().into()),
         ("firstField", info.first_field().into()),
     ]))
 }
 
+fn regions(regions: &Regions, info: &MtInfo) -> JsValue {
+    let names = regions.arrays.iter().map(|name| name.as_str().into());
+    let all = regions.all.iter().map(|region| {
+        let labels: Vec<f64> = region.labels.iter().map(|&label| label as f64).collect();
+        let corners = region.bounds.map(|corner| info.lattice.point(corner));
+        let [r, g, b] = region_color(region.color);
+        object(&[
+            ("name", region.name.as_str().into()),
+            ("labels", list(&labels)),
+            ("tetrahedra", region.tetrahedra.into()),
+            ("volume", region.volume.into()),
+            ("bounds", list(corners.as_flattened())),
+            ("color", format!("#{r:02x}{g:02x}{b:02x}").into()),
+        ])
+    });
+    object(&[("arrays", objects(names)), ("deviation", regions.deviation.into()), ("all", objects(all))])
+}
+
 fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
-    let FieldInfo { name, min, max, bits, unit, time, vector, .. } = &info.fields[index];
+    let FieldInfo { name, min, max, bits, unit, time, vector, extremes: ends, averaged, .. } =
+        &info.fields[index];
     let vector = vector.as_ref().map(|part| {
         object(&[("name", part.name.as_str().into()), ("component", part.component.map(f64::from).into())])
     });
@@ -97,9 +118,29 @@ fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
         ("vector", vector.unwrap_or(JsValue::UNDEFINED)),
         ("floor", (info.floor(index) * info.fields[index].range()).into()),
         ("histogram", histogram),
+        ("extremes", ends.as_ref().map_or(JsValue::UNDEFINED, extremes)),
+        ("averaged", averaged.as_ref().map_or(JsValue::UNDEFINED, of_cells)),
         ("isovalue", session.first_isovalue(index).into()),
         ("curve", object(&[("errors", doubles(&errors)), ("bytes", doubles(&bytes))])),
     ])
+}
+
+fn extremes(extremes: &Extremes) -> JsValue {
+    let [min, max] = extremes.both().map(|Extreme { value, place, cell, part }| {
+        object(&[
+            ("value", (*value).into()),
+            ("place", list(place)),
+            ("cell", (*cell).into()),
+            ("part", part.as_deref().into()),
+        ])
+    });
+    object(&[("min", min), ("max", max)])
+}
+
+/// What averaging has done to a field at cells.
+fn of_cells(Averaged { input, difference }: &Averaged) -> JsValue {
+    let difference = record(&["rms", "largest"], &[difference.rms, difference.largest]);
+    object(&[("input", extremes(input)), ("difference", difference)])
 }
 
 /// The numbers among the members of the object for [`RefineStats`].
@@ -148,6 +189,8 @@ const ARRAYS: [&str; 4] = ["positions", "field", "tets", "neighbors"];
 
 /// A copy of the `wanted` arrays of `mesh` outside wasm memory.
 pub fn mesh_arrays(mesh: &MeshView<'_>, stored: &Stored, wanted: u32) -> JsMesh {
+    let shown = shown_tets(mesh);
+    let mesh = shown.as_ref().map_or(*mesh, |[tets, neighbors]| MeshView { tets, neighbors, ..*mesh });
     let arrays: JsMesh = object(&[]);
     stored.put(arrays.as_ref());
     put_arrays(arrays.as_ref(), wanted, |at| match at {
@@ -157,6 +200,21 @@ pub fn mesh_arrays(mesh: &MeshView<'_>, stored: &Stored, wanted: u32) -> JsMesh 
         _ => integers(mesh.neighbors.as_flattened()),
     });
     arrays
+}
+
+/// Tetrahedra and neighbours without those of regions that are not shown; none if all are.
+fn shown_tets(mesh: &MeshView<'_>) -> Option<[Vec<[u32; 4]>; 2]> {
+    let is_shown = |t: u32| mesh.tets[t as usize][0] != NONE;
+    let all = 0..mesh.tets.len() as u32;
+    if all.clone().all(is_shown) {
+        return None;
+    }
+    let mut numbers = vec![NONE; mesh.tets.len()];
+    (0..).zip(all.clone().filter(|&t| is_shown(t))).for_each(|(number, t)| numbers[t as usize] = number);
+    let shown = || all.clone().filter(|&t| is_shown(t)).map(|t| t as usize);
+    let number = |n: u32| numbers.get(n as usize).copied().unwrap_or(NONE);
+    let neighbors = shown().map(|t| mesh.neighbors[t].map(number)).collect();
+    Some([shown().map(|t| mesh.tets[t]).collect(), neighbors])
 }
 
 /// Puts the `wanted` ones of the arrays of a mesh into `object`.

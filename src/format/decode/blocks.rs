@@ -3,7 +3,7 @@
 use super::{Decoder, ExactStatus, Stage};
 use crate::format::header::{END_BYTES, HEAD_BYTES, Kind, SectionHead};
 use crate::format::read::Reader;
-use crate::format::{BlockInfo, FormatError, Index};
+use crate::format::{FormatError, Index};
 use crate::mt::{PageError, UpdatePages};
 use std::ops::Range;
 
@@ -31,8 +31,8 @@ impl Decoder {
     pub fn block_ranges(&self, block: u32) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         let Some(index) = &self.head.index else { return ranges };
-        let Some(info) = index.blocks.get(block as usize) else { return ranges };
-        let before: u64 = index.blocks[..block as usize].iter().map(BlockInfo::len).sum();
+        let before = self.head.block_starts.get(block as usize).copied();
+        let (Some(info), Some(before)) = (index.blocks.get(block as usize), before) else { return ranges };
         let Some(mut at) = self.head_end().and_then(|end| end.checked_add(before)) else { return ranges };
         for (part, &length) in info.lengths.iter().enumerate() {
             let Some(end) = at.checked_add(u64::from(length)) else { return Vec::new() };
@@ -77,9 +77,7 @@ impl Decoder {
 
     /// The bytes of the file behind the blocks of a half-edge MT, where exact values are; none if there are none, or that is not known yet.
     pub fn exact_range(&self) -> Option<Range<u64>> {
-        let index = self.head.index.as_ref()?;
-        let blocks = index.blocks.iter().try_fold(0_u64, |sum, block| sum.checked_add(block.len()))?;
-        let start = self.head_end()?.checked_add(blocks)?;
+        let start = self.head_end()?.checked_add(*self.head.block_starts.last()?)?;
         let end = self.total?.checked_sub(END_BYTES as u64)?;
         (start < end).then_some(start..end)
     }
@@ -138,14 +136,8 @@ impl Decoder {
 
     /// The block of which a range of [`Decoder::block_ranges`] begins at this byte of the file.
     pub fn block_at(&self, start: u64) -> Option<u32> {
-        let index = self.head.index.as_ref()?;
         let behind = start.checked_sub(self.head_end()?)?;
-        let mut end = 0_u64;
-        let block = index.blocks.iter().position(|block| {
-            end = end.saturating_add(block.len());
-            behind < end
-        })?;
-        let block = block as u32;
+        let block = self.head.block_starts.partition_point(|&start| start <= behind).checked_sub(1)? as u32;
         self.block_ranges(block).iter().any(|range| range.start == start).then_some(block)
     }
 

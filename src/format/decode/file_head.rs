@@ -5,6 +5,7 @@ use crate::format::coder::{Models, Source};
 use crate::format::header::Start;
 use crate::format::payload::histogram::Histograms;
 use crate::format::payload::kind_codec::{KindCodec, codec_of};
+use crate::format::payload::regions::RegionsHead;
 use crate::format::payload::{BaseParts, half_edge};
 use crate::format::read::Reader;
 use crate::format::{FormatError, Index};
@@ -20,9 +21,13 @@ pub(super) struct FileHead {
     pub(super) wanted: Vec<usize>,
     /// In files of half-edge MTs.
     pub(super) index: Option<Index>,
-    /// Where that is in the file.
+    /// For each block the bytes of the blocks in front of it; at last the bytes of all.
+    pub(super) block_starts: Vec<u64>,
+    /// Where the index is in the file.
     pub(super) index_at: Range<u64>,
     pub(super) histograms: Option<Histograms>,
+    /// Until the base mesh is there; then they are in the MT.
+    pub(super) regions: Option<RegionsHead>,
     pub(super) models: Option<Models>,
     /// Until all wanted fields are there; then it is in the MT.
     pub(super) base: Option<BaseParts>,

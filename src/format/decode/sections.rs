@@ -10,7 +10,7 @@ use crate::format::payload::exact::Corrections;
 use crate::format::payload::half_edge;
 use crate::format::payload::histogram::Histograms;
 use crate::format::payload::kind_codec::codec_of;
-use crate::format::payload::{FieldPart, bounds};
+use crate::format::payload::{FieldPart, bounds, extremes, regions};
 use crate::format::read::Reader;
 use crate::format::{BlockInfo, FormatError, Index, payload};
 use crate::mt::{Mt, MtInfo, MultiTessellation, UpdatePages, updates_of_page};
@@ -24,6 +24,8 @@ impl Decoder {
             Kind::INDX => self.open_index(content)?,
             Kind::HIST => self.open_histograms(content)?,
             Kind::BOUNDS => self.open_bounds(content)?,
+            Kind::EXTREMES => self.open_extremes(content)?,
+            Kind::REGIONS => self.open_regions(content)?,
             Kind::MODL => self.open_models(content)?,
             Kind::BASE => self.open_base(content)?,
             Kind::FLDB => self.open_base_field(content)?,
@@ -81,22 +83,23 @@ impl Decoder {
     }
 
     pub(super) fn open_index(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
-        let FileHead { info: Some(info), index: index @ None, .. } = &mut self.head else {
+        let FileHead { info: Some(info), index: index @ None, block_starts, .. } = &mut self.head else {
             return Err(content.out_of_place());
         };
         if !info.kind.is_paged() {
             return Err(content.out_of_place());
         }
         let start = self.bytes - (HEAD_BYTES + content.len()) as u64;
-        *index = Some(Index::read(content, info)?);
+        let index = index.insert(Index::read(content, info)?);
+        *block_starts = index.block_starts();
         self.head.index_at = start..self.bytes;
         Ok(())
     }
 
     pub(super) fn open_histograms(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let fields = self.head.fields();
-        let has_bounds = self.head.info.as_ref().is_some_and(|info| info.bounds.is_some());
-        let in_place = self.head.is_described() && !has_bounds;
+        let is_behind = |info: &MtInfo| info.bounds.is_some() || extremes::are_known(&info.fields);
+        let in_place = self.head.is_described() && !self.head.info.as_ref().is_some_and(is_behind);
         let FileHead { histograms: histograms @ None, models: None, .. } = &mut self.head else {
             return Err(content.out_of_place());
         };
@@ -112,10 +115,32 @@ impl Decoder {
         let FileHead { info: Some(info), models: None, .. } = &mut self.head else {
             return Err(content.out_of_place());
         };
-        if info.bounds.is_some() || !is_described {
+        if info.bounds.is_some() || extremes::are_known(&info.fields) || !is_described {
             return Err(content.out_of_place());
         }
         info.bounds = Some(bounds::read(content, info.lattice.bits)?);
+        Ok(())
+    }
+
+    pub(super) fn open_extremes(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let is_described = self.head.is_described();
+        let FileHead { info: Some(info), models: None, .. } = &mut self.head else {
+            return Err(content.out_of_place());
+        };
+        if extremes::are_known(&info.fields) || !is_described {
+            return Err(content.out_of_place());
+        }
+        extremes::read(content, &mut info.fields)?;
+        Ok(info.check()?)
+    }
+
+    pub(super) fn open_regions(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let FileHead { info: Some(info), index: Some(index), regions: regions @ None, models: None, .. } =
+            &mut self.head
+        else {
+            return Err(content.out_of_place());
+        };
+        *regions = Some(regions::read(content, info, index)?);
         Ok(())
     }
 
@@ -159,6 +184,12 @@ impl Decoder {
             && let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info())
         {
             let (mut mt, in_order) = base.start(info, self.head.start.tet_errors)?;
+            if let (Mt::HalfEdge(mt), Some(regions)) = (&mut mt, self.head.regions.take()) {
+                let regions = regions.of_base(mt.base().tets.len()).ok_or_else(|| {
+                    self.corrupt("the base mesh does not have as many tetrahedra as regions are stated for")
+                })?;
+                mt.set_regions(regions)?;
+            }
             if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
                 let wanted = &self.head.wanted;
                 let of_block =

@@ -13,15 +13,25 @@ pub fn write(out: &mut Vec<u8>, [low, high]: [[i32; 3]; 2]) {
 
 /// Reads a box on a lattice with so many bits, 1 to 30.
 pub fn read(mut reader: Reader<'_>, bits: u32) -> Result<[[i32; 3]; 2], FormatError> {
+    let bounds = read_corners(&mut reader, bits)?;
+    reader.end()?;
+    Ok(bounds)
+}
+
+/// Reads a box among other things.
+pub fn read_corners(reader: &mut Reader<'_>, bits: u32) -> Result<[[i32; 3]; 2], FormatError> {
     let [mut least, mut largest] = [[0; 3]; 2];
     for (least, largest) in least.iter_mut().zip(&mut largest) {
         let [low, more] = [reader.varint()?, reader.varint()?];
         match low.checked_add(more) {
             Some(high) if high <= 1 << bits => (*least, *largest) = (low as i32, high as i32),
-            _ => return Err(reader.corrupt("the box of the reference mesh is not on the lattice")),
+            _ => {
+                return Err(
+                    reader.corrupt("a box around the reference mesh, or a part of it, is not on the lattice")
+                );
+            }
         }
     }
-    reader.end()?;
     Ok([least, largest])
 }
 

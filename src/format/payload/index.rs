@@ -1,6 +1,7 @@
 //! `INDX`: what is in each block and where, so that a client can fetch just the blocks that it needs.
 
 use super::changes::{bound_of, upper_byte};
+use crate::format::header::HEAD_BYTES;
 use crate::format::read::Reader;
 use crate::format::{FormatError, write};
 use crate::mt::{ErrorCode, MtInfo, updates_of_page};
@@ -18,6 +19,8 @@ pub struct BlockInfo {
     pub errors: Vec<ErrorCode>,
     /// For each field the least and the largest level in these tetrahedra, or a little less and more.
     pub ranges: Vec<[i32; 2]>,
+    /// The regions of these tetrahedra, ascending; empty if the MT has none.
+    pub regions: Vec<u16>,
 }
 
 /// Far more than what stands between index and blocks can take, and far less than places in a file can be.
@@ -47,6 +50,16 @@ pub struct Index {
 }
 
 impl Index {
+    /// For each block the bytes of the blocks in front of it; at last the bytes of all.
+    pub fn block_starts(&self) -> Vec<u64> {
+        let mut end = 0_u64;
+        let ends = self.blocks.iter().map(|block| {
+            end = end.saturating_add(block.len());
+            end
+        });
+        std::iter::once(0).chain(ends).collect()
+    }
+
     /// The updates of a block of an MT of so many.
     pub fn updates(&self, block: u32, updates: u32) -> Range<u32> {
         updates_of_page(self.block_bits, block, updates)
@@ -147,7 +160,12 @@ pub fn read_block_bits(reader: &mut Reader<'_>) -> Result<u32, FormatError> {
 fn read_block(reader: &mut Reader<'_>, info: &MtInfo) -> Result<BlockInfo, FormatError> {
     let mut block = BlockInfo::default();
     for _ in 0..=info.fields.len() {
-        block.lengths.push(reader.varint()?);
+        let length = reader.varint()?;
+        // Each is of a section. What had no length would be asked for, and never come.
+        if (length as usize) < HEAD_BYTES {
+            return Err(reader.corrupt("a part of a block is shorter than the head of a section"));
+        }
+        block.lengths.push(length);
     }
     let span = |reader: &mut Reader<'_>, bits: u32| -> Result<[i32; 2], FormatError> {
         let (low, size) = (reader.varint()?, reader.varint()?);
@@ -198,6 +216,7 @@ mod tests {
             bounds: [[0, 4, 8], [1024, 8, 12]],
             errors: vec![ErrorCode(3 << 8)],
             ranges: vec![[16, 4096]],
+            regions: Vec::new(),
         };
         Index { block_bits: 4, shared: 1 << 40, blocks: vec![block; 3] }
     }

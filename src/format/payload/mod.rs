@@ -7,12 +7,14 @@ mod changes;
 pub mod codec;
 pub mod edge;
 pub mod exact;
+pub mod extremes;
 mod families;
 pub mod half_edge;
 pub mod histogram;
 pub mod index;
 mod info;
 pub mod kind_codec;
+pub mod regions;
 mod vertex;
 
 use super::coder::{Models, Put, Source};

@@ -79,7 +79,7 @@ pub fn findings(mesh: &TetMesh, distance: f64) -> Result<MeshFindings, MeshError
     let weldable_faces = count(&open);
     seams.mark_equal_quads(&edges, &mut open);
     Ok(MeshFindings {
-        components: components(&neighbors),
+        components: components(&neighbors).count(),
         non_manifold_edges: edges.chunk_by(same_edge).filter(|run| run.len() > 2).count(),
         non_manifold_vertices: count(&non_manifold),
         open_seam_faces: count(&open),

@@ -279,7 +279,7 @@ fn look_at_halves(mesh: &CurrentMesh, [p, q]: [u32; 2], [near, far]: &[HalfStar;
                 let level = midway(mesh.levels(p)[field], mesh.levels(q)[field]);
                 tet.map(|v| if v == centre { level } else { mesh.levels(v)[field] })
             };
-            if look(&corners, &levels, 0) {
+            if look(&corners, &levels, 0, 0) {
                 return;
             }
         }

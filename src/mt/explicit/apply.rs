@@ -250,7 +250,7 @@ impl ApplyUpdates for ExplicitMt {
         for &t in self.removed(u) {
             let tet = self.tets()[t as usize].map(VertexId);
             let levels = |field: usize| tet.map(|v| self.levels(v)[field]);
-            if look(&tet.map(|v| self.position(v)), &levels, self.quarterings_of(t)) {
+            if look(&tet.map(|v| self.position(v)), &levels, self.quarterings_of(t), 0) {
                 break;
             }
         }

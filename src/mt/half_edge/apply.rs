@@ -155,11 +155,9 @@ impl HalfEdgeMt {
         }
         scratch.find_star(mesh).ok_or(UpdateError::Cavity { update: u.0 })?;
         let position = self.place_vertex(mesh, u, scratch)?;
-        if !mesh.is_proven(u.0) {
-            if !scratch.places.is_positive(&scratch.star[..scratch.star_len]) {
-                return Err(UpdateError::Inverted { update: u.0 });
-            }
-            mesh.set_proven(u.0);
+        // Each time: what a damaged file says of removers may give an update another T_u when other pages are there.
+        if !scratch.places.is_positive(&scratch.star[..scratch.star_len]) {
+            return Err(UpdateError::Inverted { update: u.0 });
         }
         Ok(Ok(position))
     }
@@ -210,6 +208,9 @@ impl HalfEdgeMt {
             if i >= moved {
                 if new.beyond != NONE {
                     mesh.relink(new.beyond, new.source, t);
+                }
+                if let Some(&region) = mesh.regions.get(new.source as usize) {
+                    mesh.regions[t as usize] = region;
                 }
                 tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
             }
@@ -436,6 +437,9 @@ impl ApplyUpdates for HalfEdgeMt {
         mesh.tag_all(self.base_marks().iter().map(|mark| mark.remover));
         mesh.keep_tet_bytes(self.base_marks().iter().map(|mark| mark.inner).collect());
         mesh.whole_stars = true;
+        if let Some(regions) = self.regions() {
+            mesh.regions.clone_from(&regions.of_base);
+        }
         Ok(mesh)
     }
 
@@ -477,11 +481,14 @@ impl ApplyUpdates for HalfEdgeMt {
                 Ok(slots) => slots,
                 Err(child) => return Ok(Applied::Blocked(child)),
             };
-            let tets = star.tets[..star.len].iter().map(|&t| mesh.tets[t as usize]);
-            for tet in tets.filter(|tet| !tet.contains(&near)) {
+            for &t in &star.tets[..star.len] {
+                let tet = mesh.tets[t as usize];
+                if tet.contains(&near) {
+                    continue;
+                }
                 let tet = tet.map(|v| if v == slot { near } else { v });
                 let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
-                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, 0) {
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, 0, mesh.region(t)) {
                     break;
                 }
             }

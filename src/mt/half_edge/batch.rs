@@ -47,6 +47,8 @@ struct AppliedUpdate {
     position: [i32; 3],
     /// How many tetrahedra it has removed; the star begins with those that took their slots.
     removed: usize,
+    /// The regions of these.
+    regions: Vec<u16>,
     /// Where its star and its link end in the lists of the batch.
     star_end: usize,
     link_end: usize,
@@ -282,6 +284,7 @@ impl Batch {
         self.applied.push(AppliedUpdate {
             position,
             removed: scratch.removed_len,
+            regions: mesh.regions_of(&scratch.slots[..scratch.removed_len]),
             star_end: self.star.len(),
             link_end: self.link.len(),
         });
@@ -390,6 +393,9 @@ impl Batch {
                 mt.push(&record).map_err(damaged)?;
                 let parents = &coded.parents[before(at, |at| coded.parent_ends[at])..coded.parent_ends[at]];
                 reaches.push(coded.bounds[at], &coded.ranges[at * fields..][..fields], parents);
+                if mt.regions().is_some() {
+                    reaches.push_regions(self.applied[i].regions.clone());
+                }
             }
             coded.faults.into_iter().for_each(|fault| facts.note(fault));
             coded.failed.map_or(Ok(()), Err)?;

@@ -14,6 +14,7 @@ use crate::mt::facts::{MtFacts, level_volumes};
 use crate::mt::reaches::Reaches;
 use crate::mt::{
     ApplyUpdates, BaseMesh, ConvertError, CurrentMesh, ErrorCode, Margins, MtInfo, MultiTessellation,
+    Regions, UpdateError,
 };
 use crate::threads;
 
@@ -51,7 +52,8 @@ pub struct HalfEdgeBuilder {
 }
 
 impl HalfEdgeBuilder {
-    /// Without updates yet. `names` are numbers of the MT's vertices in another order, by which stars are sorted.
+    /// Without updates yet. `names` are numbers of the MT's vertices in another order, by which stars are sorted. Volumes, boxes
+    /// and colours of `regions` are found at the end.
     ///
     /// # Errors
     /// If the base mesh is not usable.
@@ -60,11 +62,15 @@ impl HalfEdgeBuilder {
         base: BaseMesh,
         marks: Vec<BaseMark>,
         (forest, names): (Forest, Vec<u32>),
+        regions: Option<Regions>,
         page_bits: u32,
     ) -> Result<Self, ConvertError> {
         let vertices = 0..base.positions.len() as u32;
         let of_base: Vec<Vec<ForestChild>> = vertices.map(|v| forest.children(v).to_vec()).collect();
-        let mt = HalfEdgeMt::new(info, base, marks, &of_base, page_bits).map_err(damaged)?;
+        let mut mt = HalfEdgeMt::new(info, base, marks, &of_base, page_bits).map_err(damaged)?;
+        if let Some(regions) = regions {
+            mt.set_regions(regions).map_err(damaged)?;
+        }
         let mut mesh = mt.start().map_err(|error| ConvertError::Damaged(error.into()))?;
         mesh.make_room(mt.info());
         Ok(Self {
@@ -131,6 +137,7 @@ impl HalfEdgeBuilder {
         if mt.updates() == mt.info().updates {
             facts.reaches = reaches.of_pages(mt.pages.bits(), mt.info().fields.len());
             facts.volumes = level_volumes(mt.info(), &mesh);
+            mt.measure_regions(&mesh).ok_or(damaged(UpdateError::Cavity { update: mt.updates() }))?;
             mt.set_facts(facts);
         }
         Ok(mt)

@@ -34,7 +34,7 @@ impl HalfEdgeMt {
         let forest = Forest::new(vertices as usize, near.clone(), offset);
         let names = (0..vertices).collect();
         let mut builder =
-            HalfEdgeBuilder::new(info, explicit.base().clone(), marks, (forest, names), page_bits)?;
+            HalfEdgeBuilder::new(info, explicit.base().clone(), marks, (forest, names), None, page_bits)?;
         let mut star = Vec::new();
         for u in 0..updates {
             find_star(explicit, UpdateId(u), &mut star).ok_or(refused(u))?;

@@ -28,9 +28,11 @@ use crate::mt::error::Result;
 use crate::mt::facts::MtFacts;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::pages::{Page, Pages, Rows};
+use crate::mt::regions::{RegionInfo, Regions, measure};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
-    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId, VertexId,
+    BaseMesh, CurrentMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId,
+    VertexId,
 };
 
 /// An update whose near vertex is the one that this is stored with.
@@ -83,6 +85,7 @@ pub struct HalfEdgeMt {
     /// One for each field.
     pub(super) zeros: Vec<ErrorCode>,
     pub(super) facts: Option<Box<MtFacts>>,
+    regions: Option<Box<Regions>>,
 }
 
 /// Two MTs are equal if they have the same updates, whatever their pages.
@@ -93,6 +96,7 @@ impl PartialEq for HalfEdgeMt {
             && self.base == other.base
             && self.base_marks == other.base_marks
             && self.base_children == other.base_children
+            && self.regions == other.regions
             && self.updates() == other.updates()
             && (0..self.updates()).all(same)
     }
@@ -167,6 +171,7 @@ impl HalfEdgeMt {
             bounds: vec![ErrorCode::MAX; fields],
             zeros: vec![ErrorCode::ZERO; fields],
             facts: None,
+            regions: None,
         };
         for (v, row) in (0..).zip(children) {
             mt.check_children(0, None, row)?;
@@ -228,6 +233,7 @@ impl HalfEdgeMt {
         let children: Vec<Vec<ForestChild>> = vertices.map(|v| self.children_of(v).to_vec()).collect();
         let (info, base) = (self.info.clone(), self.base.clone());
         let mut mt = Self::new(info, base, self.base_marks.clone(), &children, page_bits)?;
+        mt.regions.clone_from(&self.regions);
         for update in 0..self.updates() {
             mt.push(&self.update(UpdateId(update)).ok_or(UpdateError::Missing { update })?)?;
         }
@@ -250,6 +256,32 @@ impl HalfEdgeMt {
     /// Keeps what is known from having applied all updates.
     pub(super) fn set_facts(&mut self, facts: MtFacts) {
         self.facts = Some(Box::new(facts));
+    }
+
+    /// States the regions of the volume.
+    ///
+    /// # Errors
+    /// If not every base tetrahedron has one of them.
+    pub fn set_regions(&mut self, regions: Regions) -> Result<()> {
+        let known = |&region: &u16| usize::from(region) < regions.all.len();
+        if regions.of_base.len() != self.base.tets.len() || !regions.of_base.iter().all(known) {
+            return Err(UpdateError::Cavity { update: 0 });
+        }
+        self.regions = Some(Box::new(regions));
+        Ok(())
+    }
+
+    /// Finds what is said of the regions in the reference mesh, given that. None if one does not have the tetrahedra that are stated.
+    pub(super) fn measure_regions(&mut self, mesh: &CurrentMesh) -> Option<()> {
+        let Some(regions) = &mut self.regions else { return Some(()) };
+        let step = self.info.lattice.step;
+        let found = measure(mesh, step, regions.all.len());
+        for (region, found) in regions.all.iter_mut().zip(found) {
+            let RegionInfo { tetrahedra, volume, bounds, color, .. } = found;
+            (region.volume, region.bounds, region.color) = (volume, bounds, color);
+            (region.tetrahedra == tetrahedra).then_some(())?;
+        }
+        Some(())
     }
 
     /// What is known from having applied all updates: none of an MT that has changed since, or that was not made update by update.
@@ -370,6 +402,10 @@ impl MultiTessellation for HalfEdgeMt {
         self.pages.to_come_in(field)
     }
 
+    fn regions(&self) -> Option<&Regions> {
+        self.regions.as_deref()
+    }
+
     /// Each fills at least one gap.
     fn always_grows(&self) -> bool {
         true
@@ -378,6 +414,7 @@ impl MultiTessellation for HalfEdgeMt {
     fn bytes(&self) -> u64 {
         let marks = size_of_val(&self.base_marks[..]) + self.base_children.bytes();
         let facts = self.facts.as_ref().map_or(0, |facts| facts.bytes());
-        self.base.bytes() + (marks + self.near.bytes() + facts) as u64 + self.pages.all_bytes()
+        let regions = self.regions().map_or(0, Regions::bytes);
+        regions + self.base.bytes() + (marks + self.near.bytes() + facts) as u64 + self.pages.all_bytes()
     }
 }

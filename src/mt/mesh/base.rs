@@ -1,7 +1,8 @@
 //! The base mesh, and what must hold of it before anything is applied to it.
 
 use crate::geom::{WIDE_BITS, orient3d};
-use crate::mt::MtInfo;
+use crate::mesh::{Averaged, Extreme, Extremes};
+use crate::mt::{FieldInfo, MtInfo};
 use thiserror::Error;
 
 /// The coarsest mesh of an MT, on the lattices.
@@ -105,6 +106,11 @@ impl MtInfo {
                     "times must be finite, and what lattices round off not negative",
                 ));
             }
+            if !has_sound_extremes(field) {
+                return Err(BaseMeshError::Info(
+                    "extremes must be finite and in order, differences not negative",
+                ));
+            }
             if field.bits == 0 || field.bits > MAX_FIELD_BITS {
                 return Err(BaseMeshError::Info("field bits must be 1 to 24"));
             }
@@ -134,6 +140,19 @@ impl MtInfo {
         position.iter().all(|&x| 0 <= x && x <= 1 << self.lattice.bits)
             && levels.iter().zip(&self.fields).all(|(&q, field)| 0 <= q && q < 1 << field.bits)
     }
+}
+
+/// Whether what is known of a field's extremes, and of its average from cells, can be.
+fn has_sound_extremes(field: &FieldInfo) -> bool {
+    let is_finite =
+        |extreme: &Extreme| extreme.value.is_finite() && extreme.place.iter().all(|x| x.is_finite());
+    let are_sound =
+        |both: &Extremes| both.both().into_iter().all(is_finite) && both.min.value <= both.max.value;
+    let is_size = |x: f64| (0.0..f64::INFINITY).contains(&x);
+    field.extremes.as_ref().is_none_or(are_sound)
+        && field.averaged.as_ref().is_none_or(|Averaged { input, difference }| {
+            are_sound(input) && is_size(difference.rms) && is_size(difference.largest)
+        })
 }
 
 /// Finest field lattice.

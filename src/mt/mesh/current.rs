@@ -105,6 +105,8 @@ pub struct CurrentMesh {
     /// A byte that the kind keeps for each tetrahedron; none unless it asked for them.
     pub(super) tet_bytes: Vec<u8>,
     pub(super) has_tet_bytes: bool,
+    /// The region of each tetrahedron, kept in free slots, too; empty if the MT has no regions.
+    pub(in crate::mt) regions: Vec<u16>,
     /// Whether every vertex that is not of the base mesh has a star whose tetrahedra hang together through faces.
     pub(in crate::mt) whole_stars: bool,
     /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.
@@ -153,6 +155,9 @@ impl CurrentMesh {
         make_room(&mut self.neighbors, tets);
         make_room(&mut self.tags, tets);
         make_room(&mut self.tet_bytes, tets);
+        if !self.regions.is_empty() {
+            make_room(&mut self.regions, tets);
+        }
         make_room(&mut self.marks, tets);
     }
 
@@ -187,6 +192,7 @@ impl CurrentMesh {
             tags: Vec::new(),
             tet_bytes: Vec::new(),
             has_tet_bytes: false,
+            regions: Vec::new(),
             whole_stars: false,
             place_of: PagedArray::new(NONE),
             free_vertices: Vec::new(),
@@ -254,12 +260,6 @@ impl CurrentMesh {
         self.proven.insert(u);
     }
 
-    /// Updates from this one on are to be checked again: what was not known of when they were applied may have to come
-    /// before them.
-    pub(crate) fn forget_proven(&mut self, from: u32) {
-        self.proven.truncate(from);
-    }
-
     /// Forgets memory of vertices that are not in the mesh.
     pub(in crate::mt) fn forget_vertices(&mut self, vertices: Range<u32>) {
         self.slot_of.forget(vertices);
@@ -287,6 +287,7 @@ impl CurrentMesh {
             + size_of_val(&self.neighbors[..])
             + size_of_val(&self.tags[..])
             + size_of_val(&self.tet_bytes[..])
+            + size_of_val(&self.regions[..])
             + size_of_val(&self.marks[..])
             + size_of_val(&self.free_tets[..])
             + size_of_val(&self.touched[..]);
@@ -340,6 +341,26 @@ impl CurrentMesh {
     /// For each tetrahedron the one across each face, [`NONE`] on the boundary.
     pub fn neighbors(&self) -> &[[u32; 4]] {
         &self.neighbors
+    }
+
+    /// The region of each tetrahedron, by slot, as an index into [`Regions::all`](crate::mt::Regions::all); empty if the MT has none.
+    pub fn regions(&self) -> &[u16] {
+        &self.regions
+    }
+
+    /// The region of tetrahedron `t`; 0 if the MT has none.
+    #[inline]
+    pub(crate) fn region(&self, t: u32) -> u16 {
+        self.regions.get(t as usize).copied().unwrap_or(0)
+    }
+
+    /// The regions of some tetrahedra, ascending, each once; none if the MT has none.
+    pub(crate) fn regions_of(&self, tets: &[u32]) -> Vec<u16> {
+        let mut regions: Vec<u16> =
+            tets.iter().filter_map(|&t| self.regions.get(t as usize).copied()).collect();
+        regions.sort_unstable();
+        regions.dedup();
+        regions
     }
 
     /// Integer positions by slot.
@@ -429,6 +450,7 @@ impl CurrentMesh {
         self.tets.pop();
         self.tags.pop();
         self.tet_bytes.pop();
+        self.regions.pop();
         self.neighbors.pop();
         self.marks.pop();
     }
@@ -530,6 +552,9 @@ impl CurrentMesh {
         if self.has_tet_bytes {
             self.tet_bytes.resize(grown, 0);
         }
+        if !self.regions.is_empty() {
+            self.regions.resize(grown, 0);
+        }
         slots.iter().for_each(|&t| self.changed_tets.mark(t));
     }
 
@@ -617,14 +642,15 @@ impl CurrentMesh {
     }
 
     /// A hash of the mesh that depends neither on slots nor on the order of updates: equal sets of tetrahedra with
-    /// equal vertices, positions and levels have equal hashes, on every platform.
+    /// equal vertices, positions, levels and regions have equal hashes, on every platform.
     pub fn hash(&self) -> u64 {
         let vertices: Vec<u64> = (0..self.labels.len()).map(|slot| self.hash_vertex(slot)).collect();
         let tet_hash = |tet: &[u32; 4]| {
             let h = tet.map(|v| vertices[v as usize]);
             mix(h.iter().fold(0, |s, &x| u64::wrapping_add(s, x)) ^ mix(h[0] ^ h[1] ^ h[2] ^ h[3]))
         };
-        self.tets.iter().filter(|tet| tet[0] != NONE).fold(0, |sum, tet| sum.wrapping_add(tet_hash(tet)))
+        let live = (0..).zip(&self.tets).filter(|(_, tet)| tet[0] != NONE);
+        live.fold(0, |sum, (t, tet)| sum.wrapping_add(tet_hash(tet) ^ mix_region(self.region(t))))
     }
 
     fn hash_vertex(&self, slot: usize) -> u64 {
@@ -686,6 +712,11 @@ impl CurrentMesh {
         }
         Ok(())
     }
+}
+
+/// What the region of a tetrahedron does to its hash: nothing without regions.
+fn mix_region(region: u16) -> u64 {
+    if region == 0 { 0 } else { mix(u64::from(region)) }
 }
 
 /// A finaliser that spreads every input bit over the word (the constants are those of SplitMix64).

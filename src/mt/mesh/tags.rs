@@ -87,7 +87,7 @@ impl CurrentMesh {
         Some(self.place_of.get(tag)).filter(|&t| t != NONE)
     }
 
-    /// Takes the tag and the byte of `from` over to `to`, a free slot.
+    /// Takes the tag, the byte and the region of `from` over to `to`, a free slot.
     #[inline]
     pub(super) fn move_tag(&mut self, from: u32, to: u32) {
         if self.is_tagged() {
@@ -99,6 +99,9 @@ impl CurrentMesh {
         }
         if self.has_tet_bytes {
             self.tet_bytes[to as usize] = self.tet_bytes[from as usize];
+        }
+        if !self.regions.is_empty() {
+            self.regions[to as usize] = self.regions[from as usize];
         }
     }
 

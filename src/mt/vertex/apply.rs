@@ -556,7 +556,7 @@ pub(in crate::mt) fn show_built(
         let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
         let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
         let own = kept.map_or(0, |kept| kept[i]);
-        if look(&tet.map(|v| mesh.positions[v as usize]), &levels, own) {
+        if look(&tet.map(|v| mesh.positions[v as usize]), &levels, own, 0) {
             break;
         }
     }

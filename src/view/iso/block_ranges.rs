@@ -1,6 +1,6 @@
 //! Which values the field has in each block of tetrahedra: most blocks are passed over when an isovalue moves.
 
-use crate::mesh::BLOCK;
+use crate::mesh::{BLOCK, NONE};
 use crate::view::MeshView;
 
 /// Per block of tetrahedra the smallest and the largest value.
@@ -43,7 +43,7 @@ impl BlockRanges {
 /// any isovalue, as if it were large.
 fn range(tets: &[[u32; 4]], field: &[f64]) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for point in tets.iter().flatten() {
+    for point in tets.iter().filter(|tet| tet[0] != NONE).flatten() {
         let value = field[*point as usize];
         let [low, high] = &mut range;
         *low = if value < *low { value } else { *low };

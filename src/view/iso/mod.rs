@@ -23,8 +23,9 @@ mod update;
 
 use super::marching::{Crossing, Pieces, Polygon, select};
 use super::mesh_snapshot::MeshSnapshot;
+use super::moves::{Slope, slope};
 use super::{MeshView, SurfaceChanges};
-use crate::mesh::BLOCK;
+use crate::mesh::{BLOCK, NONE};
 use block_ranges::BlockRanges;
 use glam::DVec3;
 use gradients::{Gradients, NO_NORMAL, unit};
@@ -136,6 +137,26 @@ impl IsoSurface {
         self.pieces.crossings.list.iter().map(value).collect()
     }
 
+    /// At each vertex the slope of vectors, given by their components along x, y and z, one number a point: the mean over the
+    /// tetrahedra of its triangles.
+    ///
+    /// # Panics
+    /// As [`IsoSurface::interpolate`].
+    pub fn slopes(&self, mesh: &MeshView<'_>, vectors: [&[f64]; 3]) -> Vec<Slope> {
+        let mut sums = vec![([[0.0; 3]; 3], 0.0); self.positions.len()];
+        for (t, triangle) in self.pieces.tets_of_triangles().zip(&self.indices) {
+            let tet = mesh.tets[t as usize].map(|p| p as usize);
+            let own = slope(tet.map(|p| mesh.positions[p]), tet.map(|p| vectors.map(|along| along[p])));
+            for v in triangle {
+                let (sum, count): &mut (Slope, f64) = &mut sums[*v as usize];
+                sum.iter_mut().flatten().zip(own.iter().flatten()).for_each(|(sum, own)| *sum += own);
+                *count += 1.0;
+            }
+        }
+        // Each vertex has a triangle.
+        sums.into_iter().map(|(sum, count)| sum.map(|along| along.map(|x| x / count))).collect()
+    }
+
     /// The ranges of vertices and of triangles that were written since the last call, in ascending order, for copies
     /// elsewhere. Anything beyond the ends of the arrays is gone.
     pub fn take_changes(&mut self) -> SurfaceChanges {
@@ -232,6 +253,9 @@ impl IsoSurface {
 #[inline]
 fn polygon(mesh: &MeshView<'_>, t: u32, value: f64) -> Polygon {
     let tet = mesh.tets[t as usize];
+    if tet[0] == NONE {
+        return Polygon::default();
+    }
     let values = tet.map(|p| mesh.field[p as usize]);
     let bits = |holds: [bool; 4]| (0..4).fold(0, |bits, i| bits | usize::from(holds[i]) << i);
     Polygon::of(tet, bits(values.map(|v| v < value)), bits(values.map(|v| v == value)))

@@ -103,6 +103,11 @@ impl Pieces {
             .take_while(|(triangle, _)| triangle[0] != NONE)
     }
 
+    /// The tetrahedron of each triangle.
+    pub fn tets_of_triangles(&self) -> impl Iterator<Item = u32> {
+        self.owners.iter().map(|owner| owner >> 1)
+    }
+
     /// Marks everything as changed.
     pub fn mark_all(&mut self) {
         self.changed_vertices = ChangedBlocks::all(self.crossings.list.len());
@@ -285,7 +290,8 @@ impl Edit {
     }
 }
 
-/// Appends the numbers of the tetrahedra for which `has` holds, without a branch for each; the first has number `first`.
+/// Appends the numbers of the tetrahedra for which `has` holds, without a branch that is hard to foresee; the first has number `first`.
+/// Free slots have none.
 #[inline(always)]
 pub(super) fn select(tets: &[[u32; 4]], first: usize, found: &mut Vec<u32>, has: impl Fn(&[u32; 4]) -> bool) {
     for (first, block) in (first as u32..).step_by(BLOCK).zip(tets.chunks(BLOCK)) {
@@ -293,7 +299,7 @@ pub(super) fn select(tets: &[[u32; 4]], first: usize, found: &mut Vec<u32>, has:
         let mut count = 0;
         for (t, tet) in (first..).zip(block) {
             hits[count % BLOCK] = t;
-            count += usize::from(has(tet));
+            count += usize::from(tet[0] != NONE && has(tet));
         }
         found.extend_from_slice(&hits[..count]);
     }

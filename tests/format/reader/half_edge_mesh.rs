@@ -11,6 +11,8 @@ use std::collections::{BTreeSet, HashMap};
 pub struct Marked {
     pub tet: Tet,
     pub mark: Mark,
+    /// 0 without regions.
+    pub region: u16,
 }
 
 /// A vertex that has come, with the forest children that it can have.
@@ -46,7 +48,9 @@ impl<'a> Mesh<'a> {
             let levels = file.base_levels.iter().map(|levels| levels[v as usize]).collect();
             (v, Vertex { position, levels, children: children.clone() })
         });
-        let tets = file.base.tets.iter().zip(&forest.marks).map(|(&tet, &mark)| Marked { tet, mark });
+        let of = file.regions.as_ref().map(|regions| &regions.of_base);
+        let tets = file.base.tets.iter().zip(&forest.marks).enumerate();
+        let tets = tets.map(|(t, (&tet, &mark))| Marked { tet, mark, region: of.map_or(0, |of| of[t]) });
         Self { file, vertices: vertices.collect(), tets: tets.collect(), records: HashMap::new() }
     }
 
@@ -100,7 +104,7 @@ impl<'a> Mesh<'a> {
         assert_eq!(of_update.count(), taken.len(), "not all of what it removes hangs together");
         let removed: Vec<Marked> = taken.iter().map(|&t| self.tets[t]).collect();
         let v = self.file.base.positions.len() as u32 + k;
-        let star = star(&removed, w, v);
+        let (star, regions) = star(&removed, w, v);
         let record = self.records[&k].clone();
         let levels = self.levels(&removed, position, &record.residuals);
         let vertex = Vertex { position, levels: levels.clone(), children: record.children.clone() };
@@ -110,7 +114,8 @@ impl<'a> Mesh<'a> {
         }
         let marks = half_edge_guess::marks(&self.vertices, &star, &record);
         self.tets.retain(|marked| marked.mark.remover != Some(k));
-        self.tets.extend(star.iter().zip(marks).map(|(&tet, mark)| Marked { tet, mark }));
+        let all = star.iter().zip(marks).zip(regions);
+        self.tets.extend(all.map(|((&tet, mark), region)| Marked { tet, mark, region }));
         Change {
             errors: record.errors,
             positions: vec![position],
@@ -142,12 +147,13 @@ impl<'a> Mesh<'a> {
     }
 }
 
-/// The star of `v`, given what makes way for it, all of it at `w`.
-fn star(removed: &[Marked], w: u32, v: u32) -> Vec<Tet> {
+/// The star of `v`, given what makes way for it, all of it at `w`; and the region of each tetrahedron.
+fn star(removed: &[Marked], w: u32, v: u32) -> (Vec<Tet>, Vec<u16>) {
     let mut star: Vec<Tet> =
         removed.iter().map(|marked| marked.tet.map(|x| if x == w { v } else { x })).collect();
+    let mut regions: Vec<u16> = removed.iter().map(|marked| marked.region).collect();
     let mut rim = Vec::new();
-    for Marked { tet, mark } in removed {
+    for Marked { tet, mark, region } in removed {
         let near = tet.iter().position(|&x| x == w).expect("the near vertex");
         assert!(!mark.inner[near], "the face opposite the near vertex is inner");
         for corner in (0..4).filter(|&corner| tet[corner] != w && !mark.inner[corner]) {
@@ -155,10 +161,11 @@ fn star(removed: &[Marked], w: u32, v: u32) -> Vec<Tet> {
             added[corner] = v;
             rim.push(added.iter().copied().filter(|x| ![v, w].contains(x)).collect::<Vec<u32>>());
             star.push(added);
+            regions.push(*region);
         }
     }
     assert!(star.len() <= 128 && goes_round_once(&rim), "{rim:?}");
-    star
+    (star, regions)
 }
 
 /// Whether edges follow each other around once, or along one path.

@@ -11,6 +11,7 @@ pub mod half_edge_mesh;
 mod histogram;
 pub mod insertions;
 pub mod plain;
+mod regions;
 pub mod splits;
 pub mod wire;
 
@@ -38,6 +39,7 @@ pub struct File {
     pub histograms: Vec<Vec<u32>>,
     /// The box around the reference mesh, if it is stated.
     pub bounds: Option<[[i32; 3]; 2]>,
+    pub regions: Option<regions::Regions>,
     tables: Vec<Table>,
     pub base: Growth,
     /// In files of kind 1.
@@ -67,7 +69,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         assert_eq!(&section.kind, kind);
         section
     };
-    let info = wire::info(next(b"INFO").payload);
+    let mut info = wire::info(next(b"INFO").payload);
     let section = (info.kind == 3).then(|| next(b"INDX"));
     let index = section.map(|section| wire::index(section.payload, &info));
     let histograms = histogram::find(front, &info);
@@ -77,6 +79,12 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         assert!(before < Some(at) && Some(at) < place(b"MODL"));
         wire::bounds(front[at].payload, &info)
     });
+    if let Some(at) = place(b"extr") {
+        let before = [b"INFO", b"INDX", b"hist", b"bbox"].map(place).into_iter().max().expect("four places");
+        assert!(before < Some(at) && Some(at) < place(b"MODL"));
+        wire::extremes(front[at].payload, &mut info);
+    }
+    let regions = regions::find(front, &info, index.as_ref().map_or(0, |index| index.blocks.len()));
     let tables = coded::tables(next(b"MODL").payload, info.kind);
     let mut payload = next(b"BASE").payload;
     let [vertices, tets] = [payload.varint(), payload.varint()];
@@ -149,6 +157,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
             block_bits,
             histograms,
             bounds,
+            regions,
             tables,
             base,
             start,

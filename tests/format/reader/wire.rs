@@ -126,6 +126,18 @@ pub struct Field {
     /// Name and component; none is the length.
     pub vector: Option<(String, Option<u8>)>,
     pub time: Option<f64>,
+    /// The smallest and the largest value.
+    pub extremes: Option<[Extreme; 2]>,
+    /// Those at cells, and the differences of averaging.
+    pub averaged: Option<([Extreme; 2], [f64; 2])>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extreme {
+    pub value: f64,
+    pub place: [f64; 3],
+    /// Number, and part if it is not empty.
+    pub cell: Option<(u32, String)>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -170,6 +182,8 @@ pub fn info(mut bytes: Bytes<'_>) -> Info {
             unit: String::new(),
             vector: None,
             time: None,
+            extremes: None,
+            averaged: None,
         };
         assert!((1..=24).contains(&field.bits) && field.step > 0.0);
         info.fields.push(field);
@@ -205,14 +219,51 @@ fn more(bytes: &mut Bytes<'_>, info: &mut Info) {
     }
 }
 
+/// What is known of the extremes of fields.
+pub fn extremes(mut bytes: Bytes<'_>, info: &mut Info) {
+    let mut known = 0;
+    for field in &mut info.fields {
+        let flags = bytes.u8();
+        assert!(flags <= 3);
+        known |= flags;
+        if flags & 1 != 0 {
+            field.extremes = Some(two_extremes(&mut bytes, false));
+        }
+        if flags & 2 != 0 {
+            let ends = two_extremes(&mut bytes, true);
+            let difference = [bytes.f64(), bytes.f64()];
+            assert!(difference.iter().all(|x| x.is_finite() && *x >= 0.0));
+            field.averaged = Some((ends, difference));
+        }
+    }
+    assert_ne!(known, 0);
+    bytes.end();
+}
+
+fn two_extremes(bytes: &mut Bytes<'_>, at_cells: bool) -> [Extreme; 2] {
+    let ends = [0; 2].map(|_| {
+        let (value, place) = (bytes.f64(), [0; 3].map(|_| bytes.f64()));
+        assert!(value.is_finite() && place.iter().all(|x| x.is_finite()));
+        Extreme { value, place, cell: at_cells.then(|| (bytes.varint(), bytes.string())) }
+    });
+    assert!(ends[0].value <= ends[1].value);
+    ends
+}
+
 /// The least and the largest corner of the box around the reference mesh.
 pub fn bounds(mut bytes: Bytes<'_>, info: &Info) -> [[i32; 3]; 2] {
+    let bounds = bounds_of(&mut bytes, info);
+    bytes.end();
+    bounds
+}
+
+/// The least and the largest corner of a box.
+pub fn bounds_of(bytes: &mut Bytes<'_>, info: &Info) -> [[i32; 3]; 2] {
     let axes = [0; 3].map(|_| {
         let (low, more) = (u64::from(bytes.varint()), u64::from(bytes.varint()));
         assert!(low + more <= 1 << info.bits);
         [low as i32, (low + more) as i32]
     });
-    bytes.end();
     [0, 1].map(|end| axes.map(|axis| axis[end]))
 }
 

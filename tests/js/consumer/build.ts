@@ -4,6 +4,7 @@ import {
   TetralodError,
   build,
   inspect,
+  type AveragedField,
   type BuildOptions,
   type BuildPhase,
   type BuildProgress,
@@ -43,6 +44,8 @@ const examples: Examples<BuildOptions> = {
   fields: { fields: ["p"] },
   allFields: { allFields: true },
   cellToPoint: { cellToPoint: false },
+  preserve: { preserve: ["components"] },
+  preserveWithin: { preserveWithin: 0.01 },
   repair: { repair: "none" },
   weldDistance: { repair: "weld", weldDistance: 0.25 },
   units: { units: { p: "Pa" } },
@@ -76,6 +79,8 @@ export async function checkBuild(): Promise<void> {
     const mt = await MultiTessellation.open(bytes);
     if (mt.info.tetrahedra !== report.tetrahedra || report.tetrahedra < 100) throw new Error("it is not what was built");
     mt.free();
+    const averaged: AveragedField[] = report.averaged;
+    if (averaged.length > 0) throw new Error("no field is at cells");
     const repair: RepairReport | undefined = report.repair;
     if (repair?.level !== (options.repair ?? "safe") || repair.components !== 1 || repair.kept !== "") throw new Error("this is not repaired");
   }

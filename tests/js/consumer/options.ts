@@ -1,8 +1,11 @@
 // Every option that the types have, in use: the compiler asks for an example of each, and each is run.
 import {
   MultiTessellation,
+  type Averaged,
   type BlockProgress,
   type ErrorCurve,
+  type Extreme,
+  type Extremes,
   type FieldInfo,
   type FieldValues,
   type MtInfo,
@@ -39,7 +42,7 @@ const transfers: Examples<TransferOptions> = {
   unitLength: { points: POINTS.flat(), unitLength: 0.2 },
 };
 
-const needs: Examples<Need> = {
+const needs: Examples<Omit<Need, Parted>> = {
   error: { error: 0.01 },
   field: { error: "1%", field: 0 },
   box: { error: "1%", box: { min: { x: 0, y: 0, z: 0 }, max: [0.5, 0.5, 0.5] } },
@@ -60,7 +63,7 @@ const needs: Examples<Need> = {
   transfer: { error: "5%", transfer: { points: POINTS } },
 };
 
-const requests: Examples<RefineOptions> = {
+const requests: Examples<Omit<RefineOptions, Parted>> = {
   ...needs,
   needs: { needs: Object.values(needs) },
   where: { where: ({ errors }) => errors.map((error) => error / 0.1) },
@@ -68,6 +71,10 @@ const requests: Examples<RefineOptions> = {
   maxTets: { error: 0, maxTets: 1000 },
   maxVertices: { error: 0, maxVertices: 500 },
   maxBytes: { error: 0, maxBytes: 100_000 },
+};
+
+const ofParts: Examples<Pick<RefineOptions, Parted>> = {
+  regions: { regions: ["stator", 4] },
 };
 
 const steps: Examples<StepOptions> = {
@@ -104,6 +111,9 @@ const openings: Examples<OpenOptions> = {
   wasmUrl: { wasmUrl: new URL(import.meta.resolve("tetralod/core.wasm")) },
 };
 
+/** Options of requests to volumes that are parted, which the source is not: it refuses them. */
+type Parted = "regions";
+
 /** The members that a result has by its type, each with the kinds of value that it may have. */
 type Members<T> = { [Name in keyof T]-?: string };
 
@@ -138,6 +148,7 @@ const infos: Members<MtInfo> = {
   exactValues: "string",
   firstField: "number",
   isBox: "boolean",
+  regions: "object undefined",
   updates: "number",
 };
 
@@ -153,6 +164,8 @@ const fields: Members<FieldInfo> = {
   vector: "object undefined",
   floor: "number",
   histogram: "object",
+  extremes: "object undefined",
+  averaged: "object undefined",
   isovalue: "number",
   curve: "object",
 };
@@ -171,6 +184,24 @@ const values: Members<FieldValues> = {
 const curves: Members<ErrorCurve> = {
   errors: "object",
   bytes: "object",
+};
+
+const extremes: Members<Extremes> = {
+  min: "object",
+  max: "object",
+};
+
+const points: Members<Extreme> = {
+  value: "number",
+  place: "object",
+  cell: "number undefined",
+  part: "string undefined",
+};
+
+/** Compiled only: the file has no field that was averaged from cells. */
+export const averages: Members<Averaged> = {
+  input: "object",
+  difference: "object",
 };
 
 const progresses: Members<Progress> = {
@@ -214,6 +245,9 @@ export async function checkOptions(source: URL): Promise<void> {
   for (const field of mt.info.fields) {
     hasMembers("field", field, fields);
     hasMembers("curve", field.curve, curves);
+    if (!field.extremes) throw new Error("the file does not say where its extremes are");
+    hasMembers("extremes", field.extremes, extremes);
+    hasMembers("extreme", field.extremes.max, points);
   }
   hasMembers("progress", mt.progress, progresses);
   const all: RefineOptions[] = Object.values(requests);
@@ -223,6 +257,13 @@ export async function checkOptions(source: URL): Promise<void> {
     const isBudgeted = [options.maxTets, options.maxVertices, options.maxBytes].some((most) => most !== undefined);
     if (!done.satisfied && !isBudgeted) throw new Error(`not satisfied: ${Object.keys(options).join(", ")}`);
     hasMembers("stats", done, stats);
+  }
+  for (const options of Object.values(ofParts)) {
+    const refused = await mt.refine({ error: 0.5, ...options }).then(
+      () => false,
+      () => true,
+    );
+    if (!refused) throw new Error("regions of a volume that has none");
   }
   for (const how of Object.values(results)) {
     const { stats: done, fields: found } = await mt.refine({ error: "5%" }, how);

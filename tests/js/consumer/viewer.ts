@@ -4,12 +4,15 @@ import {
   TetralodError,
   Viewer,
   absolute,
+  displaced,
   type BlockMap,
+  type DeformState,
   type Misfit,
   type OpenedVolume,
   type Overlay,
   type OwnView,
   type PlaneState,
+  type ThresholdState,
   type ViewerFrame,
   type ViewerProgress,
   type Reading,
@@ -67,8 +70,15 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   await viewer.set({ boundary: { opacity: 0.2, edges: true, colour: "#ffffff" }, clipBox: [0, 0, 0, 1, 1, 1] });
   await viewer.set({ cells: { shape: "wire", shrink: 0.2, cut: half, colourBy: "error", width: 2 } });
   await viewer.set({ streamlines: { fields: ["u", "v", "w"], seeds: [[0, 0, 0]], radius: 0.1, field: "p" } });
+  const deform: DeformState = { field: "u", factor: 20, phase: 0.25, undeformed: true };
+  await viewer.set({ deform });
+  await viewer.set({ deform: null });
+  const threshold: ThresholdState = { range: [0.2, 0.8], field: "pressure" };
+  await viewer.set({ threshold });
+  const bent = displaced(whole, ["u_x", "u_y", "u_z"], 20);
+  [bent.positions, bent.tets, viewer.overlay?.deformation?.factor] satisfies [Float32Array | Float64Array, Uint32Array, number | undefined];
   await viewer.set({ arrows: { fields: ["u", "v", "w"], spacing: 0.1, constant: true }, outline: false });
-  await viewer.set({ colours: { map: "magma", range: [0, 1], reversed: true, log: true }, background: "light", shade: 0 });
+  await viewer.set({ colours: { map: "magma", range: [0, 1], reversed: true, log: true, bands: 8 }, background: "light", shade: 0 });
   await Promise.all([viewer.orbit(0.1, 0), viewer.zoom(2, 0, 0), viewer.pan(0.1, 0), viewer.home()]);
   await Promise.all([viewer.fly(0, 0, 1), viewer.look(0.1, 0), viewer.lookFrom("alongX")]);
   const box: number[] = await viewer.dragRegion(await viewer.pickRegion(0, 0), 0.1, 0);
@@ -96,7 +106,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const along: LineProfile = await viewer.line([0, 0, 0], new Float32Array(3));
   const { percentiles } = await viewer.stats({ bins: 10, range: [0, 1], fractions: [0.02, 0.98] });
   const shots: Blob[] = [await viewer.screenshot(), await viewer.screenshot({ width: 9, height: 9, background: "light" })];
-  [label, again?.size, along.at[0], percentiles[0], shots.length] satisfies (string | number | undefined)[];
+  [label, again?.size, again?.region, again?.all[0], along.at[0], percentiles[0], shots.length] satisfies (string | number | undefined)[];
   const texts: string[] = [
     viewer.adapter,
     String(viewer.isSoftware satisfies boolean),

@@ -4,7 +4,8 @@ use crate::BuildError;
 use crate::order::base::Numbered;
 use tetralod::mesh::NONE;
 use tetralod::mt::{
-    BaseMark, ErrorCode, Forest, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate, VertexId, by_corner,
+    BaseMark, ErrorCode, Forest, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate, Regions, VertexId,
+    by_corner,
 };
 
 /// Updates in their order. Vertices are numbers of reference points.
@@ -28,9 +29,10 @@ pub(crate) struct Appender<'a> {
 }
 
 impl<'a> Appender<'a> {
-    /// Begins with the base mesh, given the positions and levels of the reference points on their lattices.
+    /// Begins with the base mesh, given the positions and levels of the reference points on their lattices. The base tetrahedra of `regions` are
+    /// in the order of the builder's places.
     pub fn new(
-        info: MtInfo,
+        (info, regions): (MtInfo, Option<Regions>),
         numbered: Numbered,
         updates: &Ordered<'_>,
         (positions, levels): (&[[i32; 3]], &'a [i32]),
@@ -49,13 +51,17 @@ impl<'a> Appender<'a> {
             let (remover, inner) = updates.base_marks[place as usize];
             marks.push(BaseMark { remover, inner: by_corner(inner, tet.map(|v| points[v as usize])) });
         }
+        let regions = regions.map(|regions| Regions {
+            of_base: places.iter().map(|&place| regions.of_base[place as usize]).collect(),
+            ..regions
+        });
         let near = updates.near.iter().map(|&near| number[near as usize]).collect();
         let offset = |u: u32| {
             let [from, to] = [updates.near, updates.vertices].map(|all| positions[all[u as usize] as usize]);
             [0, 1, 2].map(|k| to[k] - from[k])
         };
         let forest = Forest::new(points.len(), near, offset);
-        let builder = HalfEdgeBuilder::new(info, mesh, marks, (forest, points), block_bits)?;
+        let builder = HalfEdgeBuilder::new(info, mesh, marks, (forest, points), regions, block_bits)?;
         Ok(Self { builder, levels, number })
     }
 

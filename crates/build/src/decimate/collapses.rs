@@ -16,7 +16,7 @@ use crate::{BuildError, BuildProgress, BuildSummary, OnProgress};
 use std::cmp::Reverse;
 use tetralod::geom::Groups;
 use tetralod::mesh::NONE;
-use tetralod::mt::{ErrorCode, HalfEdgeMt, MtInfo, VertexId};
+use tetralod::mt::{ErrorCode, HalfEdgeMt, MtInfo, Regions, VertexId};
 
 /// Half-edge collapses in the order in which they are made. Vertices are numbers of reference points.
 #[derive(Default)]
@@ -199,7 +199,11 @@ impl Collapses {
     /// Finds the vertices that all tetrahedra have which fill the hole. With several, any will do: the one with the most tetrahedra
     /// around it keeps them.
     fn add_near(&mut self, removed: &Removed<'_>) {
-        let Removed { hole, filling, end, .. } = *removed;
+        let Removed { hole, filling, end, only_end, .. } = *removed;
+        if only_end {
+            self.near.push(end);
+            return;
+        }
         let moves = |(tet, across): (&[u32; 4], &[Across; 4]), v: u32| {
             let at = tet.iter().position(|&corner| corner == v);
             at.is_some_and(|i| matches!(across[i], Across::Face(_)))
@@ -231,6 +235,7 @@ impl Collapses {
     pub fn half_edge_mt(
         mut self,
         mut info: MtInfo,
+        regions: Option<Regions>,
         quantized: &Quantized,
         block_bits: u32,
         progress: OnProgress<'_>,
@@ -242,7 +247,8 @@ impl Collapses {
         // For the order alone.
         (self.boxes, self.also_near) = (Vec::new(), Vec::new());
         let summary = BuildSummary::of(&info, &numbered.mesh, depth);
-        let (mt, vertices) = self.append_all(info, numbered, &order, (quantized, block_bits), progress)?;
+        let (mt, vertices) =
+            self.append_all((info, regions), numbered, &order, (quantized, block_bits), progress)?;
         Ok((mt, vertices, summary))
     }
 
@@ -313,7 +319,7 @@ impl Collapses {
     /// The MT whose updates undo the collapses in this order.
     fn append_all(
         &self,
-        info: MtInfo,
+        (info, regions): (MtInfo, Option<Regions>),
         numbered: Numbered,
         order: &[u32],
         (quantized, block_bits): (&Quantized, u32),
@@ -330,7 +336,7 @@ impl Collapses {
         let base_marks: Vec<(u32, u8)> = self.base_marks.iter().copied().map(mark).collect();
         let updates = Ordered { vertices: &vertices, near: &near, base_marks: &base_marks };
         let reference = (&quantized.positions[..], &quantized.levels[..]);
-        let mut appender = Appender::new(info, numbered, &updates, reference, block_bits)?;
+        let mut appender = Appender::new((info, regions), numbered, &updates, reference, block_bits)?;
         for (u, &c) in order.iter().enumerate() {
             BuildProgress::tell_ordered(u, order.len(), progress)?;
             let Collapse { vertex, errors, star: (makers, inner), .. } = self.get(c);

@@ -29,7 +29,7 @@ use std::mem;
 use tetralod::geom::Bounds;
 use tetralod::mesh;
 use tetralod::mesh::{NONE, TetMesh, Topology};
-use tetralod::mt::{ErrorCode, MAX_UPDATES, MtInfo};
+use tetralod::mt::{ErrorCode, MAX_UPDATES, MtInfo, Regions};
 
 /// The candidates of a round are evaluated in so many batches.
 const BATCHES: usize = 64;
@@ -48,6 +48,8 @@ pub(crate) struct Decimated<R> {
     pub info: MtInfo,
     /// How far interfaces between regions have moved, in model units.
     pub interface_deviation: f64,
+    /// The regions that are kept apart, with those of the tetrahedra that are left.
+    pub regions: Option<Regions>,
 }
 
 /// Takes down the removals in the order in which they are made.
@@ -78,6 +80,8 @@ pub(crate) struct Removed<'a> {
     pub makers: &'a [u32],
     /// The neighbour that the vertex was moved to; [`NONE`] where the hole was filled otherwise.
     pub end: u32,
+    /// Whether that may not count as another one: where interfaces of regions move, which region is where depends on it.
+    pub only_end: bool,
     /// The error of each field.
     pub errors: &'a [ErrorCode],
     /// How far the boundary has moved, as an error.
@@ -98,8 +102,9 @@ pub(crate) fn decimate<R: Record + Default>(
     progress: OnProgress<'_>,
 ) -> Result<Decimated<R>, BuildError> {
     let mut record = R::default();
-    let (quantized, info, interface_deviation) = decimate_into(&mut record, mesh, config, how, progress)?;
-    Ok(Decimated { record, quantized, info, interface_deviation })
+    let (quantized, info, interface_deviation, regions) =
+        decimate_into(&mut record, mesh, config, how, progress)?;
+    Ok(Decimated { record, quantized, info, interface_deviation, regions })
 }
 
 /// [`decimate`] for any record, compiled once.
@@ -109,7 +114,7 @@ fn decimate_into(
     config: &BuildConfig,
     (criterion, purpose): (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
-) -> Result<(Quantized, MtInfo, f64), BuildError> {
+) -> Result<(Quantized, MtInfo, f64, Option<Regions>), BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
@@ -135,11 +140,12 @@ fn decimate_into(
     record.start(&info, state.mesh.tets.len());
     let mut decimator = Decimator::new(state, gift_wrap, record);
     decimator.remove_all(progress)?;
-    let Decimator { state, record, .. } = decimator;
+    let Decimator { mut state, record, .. } = decimator;
     record.finish(&state.mesh.tets, &state.removals.makers);
     let interface_deviation = state.restrictions.interface_deviation();
+    let regions = state.restrictions.take_regions(&state.mesh.tets);
     drop(state);
-    Ok((quantized, info, interface_deviation))
+    Ok((quantized, info, interface_deviation, regions))
 }
 
 /// Takes the tetrahedra out of a mesh that is owned, and frees what is not needed any more.
@@ -321,6 +327,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
             slots,
             makers: &removals.makers,
             end,
+            only_end: restrictions.may_move_interfaces(),
             errors: &errors,
             step: best.cost.step,
             reach,

@@ -3,6 +3,7 @@
 use super::{BuildCriterion, Decimated, Decimator, Key, Levels, Reference, State, WorkMesh};
 use crate::change::gift_wrap::GiftWrap;
 use crate::change::sides::rank;
+use crate::decimate::removal::RemovalSearch;
 use crate::error::centre::{Centre, Seat};
 use crate::error::cost::largest;
 use crate::insert::sequence::{Insertion, Sequence};
@@ -638,39 +639,45 @@ fn vertex_based_mts_have_the_updates_of_the_explicit_one() {
     }
 }
 
+/// Removes vertices of a mesh in some rounds. Before each, `look` gets every vertex that may go.
+fn look_in_rounds(mesh: &TetMesh, mut look: impl FnMut(&State<'_>, &mut RemovalSearch, u32)) {
+    let quantized = quantize::quantize(mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
+    let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
+    let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
+    let levels = Levels::of_purpose(Purpose::Uniform);
+    let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
+    let mut record = Sequence::default();
+    let state = State::new(work, reference, topology.non_manifold, levels);
+    let mut decimator = Decimator::new(state, None, &mut record);
+    for _ in 0..6 {
+        let Decimator { state, searches, .. } = &mut decimator;
+        for v in (0..mesh.positions.len() as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize])
+        {
+            look(state, &mut searches.ahead[0], v);
+        }
+        decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
+        let (removed, left) = (decimator.record.steps.len(), mesh.positions.len());
+        decimator.rounds.end(removed, left - removed);
+    }
+}
+
 /// Most neighbours are not evaluated: they cannot be better than the best one so far. That finds the same as evaluating each.
 #[test]
 fn the_best_neighbour_is_found() {
+    let levels = Levels::of_purpose(Purpose::Uniform);
     for (name, mesh) in domains() {
-        let quantized = quantize::quantize(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
-        let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
-        let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
-        let levels = Levels::of_purpose(Purpose::Uniform);
-        let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
-        let mut record = Sequence::default();
-        let state = State::new(work, reference, topology.non_manifold, levels);
-        let mut decimator = Decimator::new(state, None, &mut record);
         let (mut compared, mut several) = (0, 0);
-        for _ in 0..6 {
-            let Decimator { state, searches, .. } = &mut decimator;
-            let search = &mut searches.ahead[0];
-            let vertices =
-                (0..mesh.positions.len() as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
-            for v in vertices.collect::<Vec<u32>>() {
-                for level in [levels.of(0.01), levels.of(0.1), levels.last()] {
-                    let found = search.at(state, v, NONE, level).filter(|key| key.level() <= level);
-                    let link = search.hole.link.clone();
-                    let each = link.iter().filter_map(|&end| search.at(state, v, end, level));
-                    let all: Vec<Key> = each.filter(|key| key.level() <= level).collect();
-                    assert!(found == all.iter().min().copied(), "{name}: vertex {v}");
-                    compared += usize::from(found.is_some());
-                    several += usize::from(all.len() > 1);
-                }
+        look_in_rounds(&mesh, |state, search, v| {
+            for level in [levels.of(0.01), levels.of(0.1), levels.last()] {
+                let found = search.at(state, v, NONE, level).filter(|key| key.level() <= level);
+                let link = search.hole.link.clone();
+                let each = link.iter().filter_map(|&end| search.at(state, v, end, level));
+                let all: Vec<Key> = each.filter(|key| key.level() <= level).collect();
+                assert!(found == all.iter().min().copied(), "{name}: vertex {v}");
+                compared += usize::from(found.is_some());
+                several += usize::from(all.len() > 1);
             }
-            decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
-            let (removed, left) = (decimator.record.steps.len(), mesh.positions.len());
-            decimator.rounds.end(removed, left - removed);
-        }
+        });
         assert!(name == "one cell" || compared > 0 && several > 0, "{name}: {compared}, {several}");
     }
 }
@@ -678,51 +685,34 @@ fn the_best_neighbour_is_found() {
 /// What a contraction makes of a hole is known from the hole: where the vertex is in it, and what is across its faces.
 #[test]
 fn a_contraction_is_known_from_its_hole() {
+    let last = Levels::of_purpose(Purpose::Uniform).last();
     for (name, mesh) in domains() {
-        let quantized = quantize::quantize(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
-        let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
-        let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
-        let levels = Levels::of_purpose(Purpose::Uniform);
-        let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
-        let mut record = Sequence::default();
-        let state = State::new(work, reference, topology.non_manifold, levels);
-        let mut decimator = Decimator::new(state, None, &mut record);
         let (mut inside, mut linked) = (0, 0);
-        for round in 0..6 {
-            let Decimator { state, searches, .. } = &mut decimator;
-            let search = &mut searches.ahead[0];
-            let mut centre = Centre::default();
-            let vertices = (0..mesh.positions.len() as u32).filter(|&v| state.mesh.has(v));
-            for v in vertices.filter(|&v| !state.frozen[v as usize]).collect::<Vec<u32>>() {
-                let Some(key) = search.at(state, v, NONE, levels.last()) else { continue };
-                assert!(search.prepare(state, key, levels.last()), "{name}: vertex {v}");
-                let (hole, filling) = (&search.hole, &mut search.best.filling);
-                let end = hole.place(key.b).expect("the end is in the link");
-                let across = filling.across.clone();
-                hole.link_filling(filling);
-                assert_eq!(across, filling.across, "{name}: vertex {v}");
-                linked += 1;
-                centre.start(hole, &state.reference);
-                let place = state.reference.quantized.places.at(v);
-                let Some(Seat { face, lambda }) = centre.seat(hole, end) else {
-                    assert!(
-                        hole.on_boundary() || state.reference.quantized.is_moved(v),
-                        "{name}: {round} {v}"
-                    );
-                    continue;
-                };
-                let tet = filling.tets[rank(hole.others(end), face)];
-                let [w, x, y, z] = tet.map(|corner| state.reference.quantized.rounded(corner));
-                let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
-                let found = w * weights[0] + x * weights[1] + y * weights[2] + z * weights[3];
-                assert!(weights.iter().all(|weight| *weight > -1e-8), "{name}: vertex {v} at {weights:?}");
-                assert!(found.distance(place) < 1e-6 * (1.0 + w.distance(place)), "{name}: vertex {v}");
-                inside += 1;
-            }
-            decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
-            let (removed, left) = (decimator.record.steps.len(), mesh.positions.len());
-            decimator.rounds.end(removed, left - removed);
-        }
+        let mut centre = Centre::default();
+        look_in_rounds(&mesh, |state, search, v| {
+            let Some(key) = search.at(state, v, NONE, last) else { return };
+            assert!(search.prepare(state, key, last), "{name}: vertex {v}");
+            let (hole, filling) = (&search.hole, &mut search.best.filling);
+            let end = hole.place(key.b).expect("the end is in the link");
+            let across = filling.across.clone();
+            hole.link_filling(filling);
+            assert_eq!(across, filling.across, "{name}: vertex {v}");
+            linked += 1;
+            centre.start(hole, &state.reference);
+            let quantized = state.reference.quantized;
+            let place = quantized.places.at(v);
+            let Some(Seat { face, lambda }) = centre.seat(hole, end) else {
+                assert!(hole.on_boundary() || quantized.is_moved(v), "{name}: vertex {v}");
+                return;
+            };
+            let tet = filling.tets[rank(hole.others(end), face)];
+            let [w, x, y, z] = tet.map(|corner| quantized.rounded(corner));
+            let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
+            let found = w * weights[0] + x * weights[1] + y * weights[2] + z * weights[3];
+            assert!(weights.iter().all(|weight| *weight > -1e-8), "{name}: vertex {v} at {weights:?}");
+            assert!(found.distance(place) < 1e-6 * (1.0 + w.distance(place)), "{name}: vertex {v}");
+            inside += 1;
+        });
         assert!(name == "one cell" || inside > 0 && linked > 0, "{name}: {inside}, {linked}");
     }
 }

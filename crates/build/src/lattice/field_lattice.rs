@@ -2,7 +2,7 @@
 
 use crate::lattice::position_lattice::is_ordinary;
 use crate::{BuildConfig, BuildError, FieldPrecision};
-use tetralod::mesh::Field;
+use tetralod::mesh::{Extremes, Field};
 use tetralod::mt::{FieldInfo, MAX_FIELD_BITS};
 
 /// Largest integer up to which `f64` holds all.
@@ -23,11 +23,23 @@ pub(crate) fn field_lattices(fields: &[&Field], config: &BuildConfig) -> Result<
                 vector: field.vector.clone(),
                 time: field.time,
                 quantization: largest_loss(&shared, field),
+                averaged: field.averaged.clone(),
                 ..shared.clone()
             });
         }
     }
     Ok(infos)
+}
+
+/// Notes the extremes of each field, whose points are at these places.
+pub(crate) fn set_extremes<I: Iterator<Item = [f64; 3]>>(
+    infos: &mut [FieldInfo],
+    fields: &[&Field],
+    places: impl Fn() -> I,
+) {
+    for (info, field) in infos.iter_mut().zip(fields) {
+        info.extremes = Extremes::of(field.values.iter().copied().zip(places()));
+    }
 }
 
 fn shared_lattice(steps: &[&Field], config: &BuildConfig) -> Result<FieldInfo, BuildError> {

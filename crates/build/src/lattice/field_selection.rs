@@ -2,7 +2,7 @@
 
 use crate::{BuildConfig, BuildError};
 use std::collections::{HashMap, HashSet};
-use tetralod::mesh::{Field, TetMesh, is_number_or_place};
+use tetralod::mesh::{Field, TetMesh, default_field};
 use tetralod::mt::{Exact, VertexId};
 
 /// Most fields of an MT.
@@ -26,15 +26,17 @@ pub(crate) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<
         found.into_iter().for_each(&mut add);
     }
     if config.all_fields {
-        let is_length = |field: &Field| field.vector.as_ref().is_some_and(|v| v.component.is_none());
-        in_steps(mesh, |field| !is_length(field)).into_iter().for_each(&mut add);
+        let follows = |field: &Field| field.vector.as_ref().is_some_and(|v| v.component.is_none());
+        in_steps(mesh, |field| !follows(field)).into_iter().for_each(&mut add);
     } else if config.fields.is_empty()
-        && let Some(first) = first_field(mesh)
+        && let Some(first) = default_field(&mesh.fields, &config.preserve)
     {
-        in_steps(mesh, |field| field.name == first.name).into_iter().for_each(&mut add);
+        let name = &mesh.fields[first].name;
+        in_steps(mesh, |field| field.name == *name).into_iter().for_each(&mut add);
     }
     if chosen.is_empty() {
-        let at_cells = mesh.cell_fields.first().map(|field| field.name.clone());
+        let at_cells = default_field(&mesh.cell_fields, &config.preserve);
+        let at_cells = at_cells.map(|field| mesh.cell_fields[field].name.clone());
         return Err(at_cells.map_or(BuildError::NoField, |name| BuildError::CellField { name }));
     }
     if chosen.len() > MAX_FIELDS {
@@ -48,12 +50,6 @@ pub(crate) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<
         }
     }
     Ok(chosen)
-}
-
-/// The field that is kept where none is asked for: the first that does not number something or say where it is, if there is one.
-fn first_field(mesh: &TetMesh) -> Option<&Field> {
-    let tells = |field: &&Field| !is_number_or_place(&field.name);
-    mesh.fields.iter().find(tells).or(mesh.fields.first())
 }
 
 /// The fields for which `wanted` holds, in the order of the mesh, with the time steps of each field together.

@@ -187,7 +187,8 @@ pub(crate) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     check_finite(mesh, &chosen)?;
     let placed = position_lattice::place(mesh, config)?;
     position_lattice::check_scale(&placed.lattice)?;
-    let fields = field_lattice::field_lattices(&chosen, config)?;
+    let mut fields = field_lattice::field_lattices(&chosen, config)?;
+    field_lattice::set_extremes(&mut fields, &chosen, || mesh.positions.iter().copied());
     Ok(on_lattices(mesh, placed, &chosen, fields))
 }
 

@@ -50,7 +50,10 @@ pub fn assemble(
     }
     let ordered = Ordered { vertices: &listed.vertices, near: &listed.near, base_marks: &base_marks };
     let reference = (&piece.positions[..], &levels[..]);
-    let appender = Appender::new(info.clone(), numbered, &ordered, reference, plan.block_bits)?;
+    let unknown = PartsError::Damaged { what: "its tetrahedra are of other regions" };
+    let regions = plan.regions.as_ref().map(|regions| regions.of_base(&piece.regions).ok_or(unknown));
+    let described = (info.clone(), regions.transpose()?);
+    let appender = Appender::new(described, numbered, &ordered, reference, plan.block_bits)?;
     let Listed { numbers, vertices, .. } = listed;
     let depths = vec![1; vertices.len()];
     drop(vertices);

@@ -184,7 +184,7 @@ impl<'a> GridCut<'a> {
         let info = self.info(config)?;
         let sides = self.position(self.grid.dims.map(|n| n - 1));
         let whole = (self.boxes.len() as u32, self.checksum(), sides);
-        let plan = Plan::new(&info, config, purpose, whole, metadata);
+        let plan = Plan::new(&info, config, purpose, whole, None, metadata);
         // Angles are measured by the lattices alone.
         let alone = quantize::lattices_alone(info.lattice, info.fields.clone(), info.quantization);
         Restrictions::of_angles(config, &alone)?;
@@ -195,7 +195,10 @@ impl<'a> GridCut<'a> {
     }
 
     fn info(&self, config: &BuildConfig) -> Result<MtInfo, PartsError> {
-        let fields: Vec<FieldInfo> = field_lattice::field_lattices(&self.fields, config)?;
+        let mut fields: Vec<FieldInfo> = field_lattice::field_lattices(&self.fields, config)?;
+        field_lattice::set_extremes(&mut fields, &self.fields, || {
+            self.points().map(|at| self.grid.point(at))
+        });
         let [vertices, tetrahedra] = self.mesh.counts().map(|count| count as u32);
         let ends = [[0; 3], self.grid.dims.map(|n| n - 1)].map(|index| self.grid.point(index));
         let moved = |index| {

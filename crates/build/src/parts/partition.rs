@@ -7,7 +7,7 @@ use super::cut::{CUT_BITS, best_cut, shift};
 use super::fragments::{InParts, ends, joined, ranks};
 use super::grid::GridCut;
 use super::piece::{Part, Piece};
-use super::plan::{Plan, purpose};
+use super::plan::{Plan, PlanRegions, purpose};
 use crate::lattice::field_selection;
 use crate::lattice::quantize::{self, Quantized};
 use crate::restrict::restrictions::Restrictions;
@@ -58,7 +58,8 @@ pub fn part(
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let info = quantized.info(mesh.tets.len(), displacement_per_error);
     let whole = (parts, checksum(mesh), sides(&quantized.positions));
-    let plan = Plan::new(&info, config, purpose, whole, metadata);
+    let regions = restrictions.region_table().map(PlanRegions::new);
+    let plan = Plan::new(&info, config, purpose, whole, regions, metadata);
     let part_of = parts_of(&mesh.tets, &quantized, parts)?;
     let ends = ends(mesh.positions.len(), &mesh.tets, &part_of);
     if let Some(point) = ends.iter().position(|[first, last]| first > last) {

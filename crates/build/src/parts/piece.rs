@@ -277,7 +277,7 @@ impl Part {
             "a tetrahedron is not positive",
         )?;
         let (tets, earlier) = (piece.tets.len(), piece.earlier.len());
-        let labelled = if plan.has_regions { tets } else { 0 };
+        let labelled = if plan.regions.is_some() { tets } else { 0 };
         expect(piece.regions.len() == labelled, "its tetrahedra lack regions")?;
         let made = |&maker: &u32| maker == NONE || (maker as usize) < earlier;
         let marks = [piece.makers.len(), piece.inner.len()];

@@ -21,7 +21,7 @@ use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::io;
 use tetralod::geom::{Bounds, Lattice, WIDE_BITS};
-use tetralod::mesh::{FACES, Field, MAX_TETS, MeshInput, MeshPiece, TetMesh};
+use tetralod::mesh::{Extremes, FACES, Field, MAX_TETS, MeshInput, MeshPiece, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
 /// Where [`Piecewise`] puts what it does not keep in memory, by names of letters, digits and dashes.
@@ -62,6 +62,8 @@ struct Sums {
     tets: u64,
     /// The fields with their least and largest values alone.
     fields: Vec<Field>,
+    /// The same values with their places.
+    extremes: Vec<Option<Extremes>>,
     cell_fields: Vec<Field>,
     /// Fields that nobody asked for, as the first piece has them.
     input: MeshInput,
@@ -103,6 +105,7 @@ impl<'a> Piecewise<'a> {
             points: 0,
             tets: 0,
             fields: Vec::new(),
+            extremes: Vec::new(),
             cell_fields: Vec::new(),
             input: MeshInput::default(),
             shared: Vec::new(),
@@ -142,6 +145,7 @@ impl<'a> Piecewise<'a> {
             sums.cell_fields = mesh.cell_fields.iter().map(Field::without_values).collect();
             sums.input.other_fields.clone_from(&mesh.input.other_fields);
             sums.input.other_cell_fields.clone_from(&mesh.input.other_cell_fields);
+            sums.extremes = vec![None; mesh.fields.len()];
             sums.of_fields = mesh.fields.iter().map(|_| crc32fast::Hasher::new()).collect();
         }
         let is_new = |i: &usize| points[*i] >= first;
@@ -151,6 +155,11 @@ impl<'a> Piecewise<'a> {
             mesh.positions[i].iter().for_each(|x| sums.hashers[0].update(&x.to_le_bytes()));
         }
         mesh.tets.iter().flatten().for_each(|&v| sums.hashers[1].update(&points[v as usize].to_le_bytes()));
+        for (known, field) in sums.extremes.iter_mut().zip(&mesh.fields) {
+            let before = known.iter().flat_map(Extremes::both).map(|at| (at.value, at.place));
+            let here = new.iter().map(|&i| (field.values[i], mesh.positions[i]));
+            *known = Extremes::of(before.chain(here));
+        }
         for ((sum, field), hasher) in sums.fields.iter_mut().zip(&mesh.fields).zip(&mut sums.of_fields) {
             let values = || new.iter().map(|&i| field.values[i]);
             if !values().all(f64::is_finite) {
@@ -199,7 +208,10 @@ impl<'a> Piecewise<'a> {
         let fields = field_selection::fields(&mock, self.config)?;
         let number = |field: &&Field| mock.fields.iter().position(|known| std::ptr::eq(known, *field));
         let chosen: Vec<usize> = fields.iter().filter_map(number).collect();
-        let infos = field_lattice::field_lattices(&fields, self.config)?;
+        let mut infos = field_lattice::field_lattices(&fields, self.config)?;
+        for (info, &number) in infos.iter_mut().zip(&chosen) {
+            info.extremes.clone_from(&self.sums.extremes[number]);
+        }
         let lattice = self.lattice()?;
         let mut whole = Whole { lattice, chosen, fields: infos, shared, cuts: Vec::new() };
         self.check_interfaces(&whole)?;
@@ -435,7 +447,7 @@ impl<'a> Piecewise<'a> {
         let [low, high] = [bounds.min, bounds.max].map(|p| of.lattice.nearest(p));
         let sides = [0, 1, 2].map(|k| high[k] - low[k]);
         let whole = (self.parts, checksum.finalize(), sides);
-        Ok(Plan::new(&info, self.config, self.purpose, whole, metadata))
+        Ok(Plan::new(&info, self.config, self.purpose, whole, None, metadata))
     }
 
     /// Sorts all pieces into the parts.

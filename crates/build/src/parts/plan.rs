@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use tetralod::geom::Lattice;
-use tetralod::mesh::VectorPart;
-use tetralod::mt::{FieldInfo, MtInfo, MtKind};
+use tetralod::mesh::{Averaged, Difference, Extreme, Extremes, VectorPart};
+use tetralod::mt::{FieldInfo, MtInfo, MtKind, RegionInfo, Regions};
 
 /// Most parts of a plan.
 pub const MOST_PARTS: u32 = 4096;
@@ -59,8 +59,8 @@ pub struct Plan {
     pub(super) quantization: f64,
     /// The least dihedral angle and the angle of features, in degrees.
     pub(super) angles: [Option<f64>; 2],
-    /// Whether regions are kept apart.
-    pub(super) has_regions: bool,
+    /// The regions that are kept apart.
+    pub(super) regions: Option<PlanRegions>,
     pub(super) for_regions: bool,
     pub(super) block_bits: u32,
     pub(super) metadata: BTreeMap<String, String>,
@@ -76,8 +76,28 @@ pub(super) struct PlanField {
     vector: Option<(String, Option<u8>)>,
     time: Option<f64>,
     quantization: f64,
+    extremes: Option<PlanExtremes>,
+    /// Those of the input at cells, and by how much averaging them differs.
+    averaged: Option<(PlanExtremes, [f64; 2])>,
     /// Whether its exact values are kept.
     pub lossless: bool,
+}
+
+/// The smallest and the largest value: each with its place, and the number and the part of its cell.
+type PlanExtremes = [(f64, [f64; 3], Option<u32>, Option<String>); 2];
+
+fn of_extremes(extremes: &Extremes) -> PlanExtremes {
+    extremes.both().map(|Extreme { value, place, cell, part }| (*value, *place, *cell, part.clone()))
+}
+
+fn extremes_of(stored: &PlanExtremes) -> Extremes {
+    let [min, max] = stored.each_ref().map(|(value, place, cell, part)| Extreme {
+        value: *value,
+        place: *place,
+        cell: *cell,
+        part: part.clone(),
+    });
+    Extremes { min, max }
 }
 
 impl PlanField {
@@ -90,6 +110,10 @@ impl PlanField {
             vector: field.vector.as_ref().map(|vector| (vector.name.clone(), vector.component)),
             time: field.time,
             quantization: field.quantization,
+            extremes: field.extremes.as_ref().map(of_extremes),
+            averaged: field.averaged.as_ref().map(|Averaged { input, difference }| {
+                (of_extremes(input), [difference.rms, difference.largest])
+            }),
             lossless,
         }
     }
@@ -108,7 +132,43 @@ impl PlanField {
             vector: vector.map(|(name, component)| VectorPart { name: name.clone(), component: *component }),
             time: self.time,
             quantization: self.quantization,
+            extremes: self.extremes.as_ref().map(extremes_of),
+            averaged: self.averaged.as_ref().map(|(input, [rms, largest])| Averaged {
+                input: extremes_of(input),
+                difference: Difference { rms: *rms, largest: *largest },
+            }),
         }
+    }
+}
+
+/// Regions of the whole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct PlanRegions {
+    arrays: Vec<String>,
+    /// The name, the labels and the tetrahedra of each.
+    all: Vec<(String, Vec<i64>, u32)>,
+}
+
+impl PlanRegions {
+    pub fn new(regions: &Regions) -> Self {
+        let region = |region: &RegionInfo| (region.name.clone(), region.labels.clone(), region.tetrahedra);
+        Self { arrays: regions.arrays.clone(), all: regions.all.iter().map(region).collect() }
+    }
+
+    /// The regions, with those of the tetrahedra that are left; none if there are not so many.
+    pub fn of_base(&self, left: &[u32]) -> Option<Regions> {
+        let region = |(name, labels, tetrahedra): &(String, Vec<i64>, u32)| RegionInfo {
+            name: name.clone(),
+            labels: labels.clone(),
+            tetrahedra: *tetrahedra,
+            ..RegionInfo::default()
+        };
+        let number =
+            |&region: &u32| u16::try_from(region).ok().filter(|&region| usize::from(region) < self.all.len());
+        let of_base = left.iter().map(number).collect::<Option<_>>()?;
+        // Parts keep interfaces as they are.
+        let (arrays, all, deviation) = (self.arrays.clone(), self.all.iter().map(region).collect(), 0.0);
+        Some(Regions { arrays, all, of_base, deviation })
     }
 }
 
@@ -118,6 +178,7 @@ impl Plan {
         config: &BuildConfig,
         purpose: Purpose,
         (parts, input, sides): (u32, u32, [i32; 3]),
+        regions: Option<PlanRegions>,
         metadata: BTreeMap<String, String>,
     ) -> Self {
         let is_lossless = |field: &FieldInfo| {
@@ -136,7 +197,7 @@ impl Plan {
             displacement_edges: config.displacement_edges,
             quantization: info.quantization,
             angles: [config.min_dihedral, config.feature_angle],
-            has_regions: !config.preserve.is_empty(),
+            regions,
             for_regions: purpose == Purpose::Regions,
             block_bits: config.block_bits.clamp(4, 16),
             metadata,

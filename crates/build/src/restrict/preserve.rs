@@ -17,14 +17,17 @@ use crate::change::work_mesh::{WorkMesh, keep};
 use crate::lattice::quantize::Quantized;
 use crate::restrict::interface::Interface;
 use crate::{BuildConfig, BuildError};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use tetralod::geom::orient3d;
-use tetralod::mesh::{Field, MeshInput, TetMesh};
+use tetralod::mesh::{Field, MeshInput, NONE, TetMesh};
+use tetralod::mt::{self, MAX_REGIONS, MtKind, RegionInfo};
 
 /// The regions of the cells.
 pub(crate) struct Regions {
     /// The region of each tetrahedron of the mesh.
     of: Vec<u32>,
+    /// What is known of them; nothing where that is kept elsewhere.
+    table: mt::Regions,
     /// What lets curved interfaces move, if they may.
     interface: Option<Interface>,
 }
@@ -41,7 +44,19 @@ struct Triangle {
 impl Regions {
     /// Of tetrahedra whose regions are known, with interfaces that stay; none if no regions are kept apart.
     pub fn known(of: Vec<u32>) -> Option<Self> {
-        (!of.is_empty()).then_some(Self { of, interface: None })
+        (!of.is_empty()).then_some(Self { of, table: mt::Regions::default(), interface: None })
+    }
+
+    /// What is known of the regions, with that of each tetrahedron that is left, in their order.
+    pub fn finish(self, tets: &[[u32; 4]]) -> mt::Regions {
+        let left = self.of.iter().zip(tets).filter(|(_, tet)| tet[0] != NONE);
+        let (of_base, deviation) = (left.map(|(&region, _)| region as u16).collect(), self.deviation());
+        mt::Regions { of_base, deviation, ..self.table }
+    }
+
+    /// What is known of them.
+    pub fn table(&self) -> &mt::Regions {
+        &self.table
     }
 
     /// Tetrahedra have new numbers: their places in this list of the old ones, which ascend.
@@ -61,18 +76,30 @@ impl Regions {
         quantized: &Quantized,
     ) -> Result<Option<Self>, BuildError> {
         let tolerance = tolerance(config)?;
+        // Files of other kinds have no regions.
+        let has_table = config.construction.kind() == MtKind::HalfEdge;
         let mut of = vec![0_u32; mesh.tets.len()];
+        // The labels of each region.
+        let mut all = vec![Vec::new()];
         for name in &config.preserve {
-            let label = labels(mesh, name)?;
-            // Regions are numbered as they come.
             let mut numbers: BTreeMap<(u32, i64), u32> = BTreeMap::new();
-            for (region, label) in of.iter_mut().zip(label) {
-                let next = numbers.len() as u32;
-                *region = *numbers.entry((*region, label)).or_insert(next);
+            let label = labels(mesh, name)?;
+            of.iter().zip(&label).for_each(|(&region, &label)| _ = numbers.insert((region, label), 0));
+            // In ascending order.
+            (0..).zip(numbers.values_mut()).for_each(|(next, number)| *number = next);
+            of.iter_mut().zip(label).for_each(|(region, label)| *region = numbers[&(*region, label)]);
+            if has_table {
+                if numbers.len() > MAX_REGIONS {
+                    return Err(BuildError::Regions { count: numbers.len(), most: MAX_REGIONS });
+                }
+                let keys = numbers.keys();
+                all = keys.map(|(region, label)| [&all[*region as usize][..], &[*label]].concat()).collect();
             }
         }
         let interface = tolerance.map(|tolerance| Interface::new(tolerance, &mesh.tets, &of, quantized));
-        Ok((!config.preserve.is_empty()).then_some(Self { of, interface }))
+        let table =
+            if has_table { table(&config.preserve, all, &of, &mesh.input) } else { mt::Regions::default() };
+        Ok((!config.preserve.is_empty()).then_some(Self { of, table, interface }))
     }
 
     /// Whether all interfaces stay the same sets of points when the vertex of a hole is moved to `b`, or within the tolerance.
@@ -99,7 +126,25 @@ impl Regions {
         !hole.on_boundary()
             && is_sheet
             && edges.iter().any(|edge| edge.contains(&b))
+            && self.keeps_gaps(hole, b)
             && interface.may_move((hole, b), &edges, (mesh, &self.of), positions)
+    }
+
+    /// Whether each tetrahedron with the edge to `b` is of the same region as the one across its face that lasts, beside which the inverse
+    /// of the move will put it: see [`mt::Regions`].
+    fn keeps_gaps(&self, hole: &Hole, b: u32) -> bool {
+        let all =
+            || hole.faces.iter().zip(&hole.star).map(|((face, _), star)| (face, self.of[star.tet as usize]));
+        let lasts = |face: &[u32; 3], region: u32| {
+            let shares = |other: &[u32; 3]| face.iter().all(|v| *v == b || other.contains(v));
+            all().any(|(other, of)| !other.contains(&b) && shares(other) && of == region)
+        };
+        all().all(|(face, region)| !face.contains(&b) || lasts(face, region))
+    }
+
+    /// Whether interfaces may move.
+    pub fn may_change(&self) -> bool {
+        self.interface.is_some()
     }
 
     /// How far interfaces have moved, in model units.
@@ -121,6 +166,46 @@ impl Regions {
         // The slots are those of the star.
         let regions: Vec<u32> = left.map(|(_, star)| self.of[star.tet as usize]).collect();
         slots.iter().zip(regions).for_each(|(&slot, region)| self.of[slot as usize] = region);
+    }
+}
+
+/// The regions of these labels in these arrays, with the names that the input has for them, and how many tetrahedra each has.
+fn table(arrays: &[String], labels: Vec<Vec<i64>>, of: &[u32], input: &MeshInput) -> mt::Regions {
+    let mut counts = vec![0; labels.len()];
+    of.iter().for_each(|&region| counts[region as usize] += 1);
+    let known = |array: &String, label: &i64| input.label_names.get(array)?.get(label).cloned();
+    let named = |labels: &[i64]| {
+        let each = arrays.iter().zip(labels).map(|(array, label)| {
+            let number = || if labels.len() == 1 { label.to_string() } else { format!("{array} {label}") };
+            known(array, label).unwrap_or_else(number)
+        });
+        each.collect::<Vec<String>>().join(", ")
+    };
+    // Of several with one name, each has its labels behind it.
+    let mut uses: BTreeMap<String, u32> = BTreeMap::new();
+    labels.iter().for_each(|labels| *uses.entry(named(labels)).or_default() += 1);
+    let mut taken = HashSet::new();
+    let mut distinct = |labels: &[i64]| {
+        let mut name = named(labels);
+        let numbers = labels.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
+        let mut is_taken = uses[&name] > 1;
+        // The input may have such a name, too.
+        while is_taken || !taken.insert(name.clone()) {
+            name = format!("{name} ({numbers})");
+            is_taken = false;
+        }
+        name
+    };
+    let region = |(labels, tetrahedra): (Vec<i64>, u32)| RegionInfo {
+        name: distinct(&labels),
+        labels,
+        tetrahedra,
+        ..RegionInfo::default()
+    };
+    mt::Regions {
+        arrays: arrays.to_vec(),
+        all: labels.into_iter().zip(counts).map(region).collect(),
+        ..mt::Regions::default()
     }
 }
 
@@ -213,7 +298,7 @@ fn tolerance(config: &BuildConfig) -> Result<Option<f64>, BuildError> {
 }
 
 /// The label of each cell by a field at cells; or, by a field at points, the least of its corners'.
-fn labels(mesh: &TetMesh, name: &str) -> Result<Vec<i64>, BuildError> {
+pub(crate) fn labels(mesh: &TetMesh, name: &str) -> Result<Vec<i64>, BuildError> {
     let whole = |(at, value): (u32, &f64)| {
         let is_whole = value.trunc() == *value && value.abs() <= LARGEST_LABEL;
         // Exact: it is an integer that a double holds.
@@ -225,25 +310,27 @@ fn labels(mesh: &TetMesh, name: &str) -> Result<Vec<i64>, BuildError> {
     };
     let all = |field: &Field| (0..).zip(&field.values).map(whole).collect::<Result<Vec<i64>, _>>();
     let is_it = |field: &&Field| field.name == name;
-    if let Some(field) =
-        mesh.cell_fields.iter().filter(is_it).find(|field| field.values.len() == mesh.tets.len())
-    {
-        return all(field).map_err(|error| at_cell(error, mesh));
+    // Time steps share a name.
+    let all_steps = |steps: &[&Field]| {
+        let first = all(steps[0])?;
+        let is_other = steps.iter().any(|field| field.values != steps[0].values);
+        if is_other { Err(BuildError::LabelChanges { name: name.to_owned() }) } else { Ok(first) }
+    };
+    let at_cells: Vec<&Field> =
+        mesh.cell_fields.iter().filter(is_it).filter(|field| field.values.len() == mesh.tets.len()).collect();
+    if !at_cells.is_empty() {
+        return all_steps(&at_cells).map_err(|error| at_cell(error, mesh));
     }
-    match mesh.fields.iter().find(is_it) {
-        Some(field) => {
-            let labels = all(field)?;
-            let least = |tet: &[u32; 4]| tet.map(|v| labels[v as usize]).into_iter().fold(i64::MAX, i64::min);
-            Ok(mesh.tets.iter().map(least).collect())
-        }
-        None => {
-            let MeshInput { other_fields, other_cell_fields, .. } = &mesh.input;
-            let known =
-                mesh.cell_fields.iter().chain(other_cell_fields).chain(&mesh.fields).chain(other_fields);
-            let known = known.map(|field| field.name.clone()).collect();
-            Err(BuildError::UnknownLabel { name: name.to_owned(), known })
-        }
+    let at_points: Vec<&Field> = mesh.fields.iter().filter(is_it).collect();
+    if at_points.is_empty() {
+        let MeshInput { other_fields, other_cell_fields, .. } = &mesh.input;
+        let known = mesh.cell_fields.iter().chain(other_cell_fields).chain(&mesh.fields).chain(other_fields);
+        let known = known.map(|field| field.name.clone()).collect();
+        return Err(BuildError::UnknownLabel { name: name.to_owned(), known });
     }
+    let labels = all_steps(&at_points)?;
+    let least = |tet: &[u32; 4]| tet.map(|v| labels[v as usize]).into_iter().fold(i64::MAX, i64::min);
+    Ok(mesh.tets.iter().map(least).collect())
 }
 
 /// The error with the number of the cell in the input.
@@ -256,8 +343,8 @@ fn at_cell(error: BuildError, mesh: &TetMesh) -> BuildError {
     }
 }
 
-/// Doubles hold all integers up to this one.
-const LARGEST_LABEL: f64 = 9_007_199_254_740_992.0;
+/// Doubles hold all integers up to this one and the next, which the one behind that is rounded to.
+const LARGEST_LABEL: f64 = 9_007_199_254_740_991.0;
 
 /// A point is meant by a place that is nearer to it than this part of the diagonal of the model.
 pub(crate) const NEAR: f64 = 1e-6;

@@ -8,6 +8,7 @@ use crate::lattice::quantize::Quantized;
 use crate::restrict::preserve::{Regions, kept_points};
 use crate::{BuildConfig, BuildCriterion, BuildError, Method};
 use tetralod::mesh::TetMesh;
+use tetralod::mt;
 
 /// The restrictions of a build; none by default, and then nothing is looked at.
 #[derive(Default)]
@@ -54,6 +55,17 @@ impl Restrictions {
         self.regions.as_ref().map_or(&[], Regions::all)
     }
 
+    /// What is known of the regions; nothing if none are kept apart.
+    pub fn region_table(&self) -> Option<&mt::Regions> {
+        self.regions.as_ref().map(Regions::table)
+    }
+
+    /// What is known of the regions, with that of each tetrahedron that is left, those that begin with [`NONE`](tetralod::mesh::NONE) being gone;
+    /// none if none are kept apart.
+    pub fn take_regions(&mut self, tets: &[[u32; 4]]) -> Option<mt::Regions> {
+        Some(self.regions.take()?.finish(tets))
+    }
+
     /// Whether what they allow depends on more than a hole and what fills it.
     pub fn look_beyond_holes(&self) -> bool {
         self.regions.is_some()
@@ -96,6 +108,11 @@ impl Restrictions {
         if let Some(regions) = &mut self.regions {
             regions.renumber(live);
         }
+    }
+
+    /// Whether interfaces between regions may move.
+    pub fn may_move_interfaces(&self) -> bool {
+        self.regions.as_ref().is_some_and(Regions::may_change)
     }
 
     /// How far interfaces between regions have moved, in model units.

@@ -3,6 +3,7 @@
 use super::deviation::{Deviation, TetErrors};
 use super::mesh_checks::{self, PlainMesh};
 use super::queries::Query;
+use super::regions::KeptRegions;
 use super::report::{VerifyReport, note};
 use tetralod::mt::{ApplyUpdates, ErrorCode};
 use tetralod::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetData};
@@ -23,6 +24,7 @@ pub(super) struct Case<'a, M> {
     pub query: &'a Query,
     pub front: &'a Front,
     pub outcome: &'a Outcome,
+    pub kept: Option<&'a KeptRegions<'a>>,
 }
 
 /// The mesh that a query was answered with, and what its MT tells of it.
@@ -44,7 +46,8 @@ impl<M: ApplyUpdates> Case<'_, M> {
     ) {
         let mesh = PlainMesh::of(self.front.mesh());
         // Without a valid mesh there is nothing to measure.
-        if let Err(failure) = mesh.check(reference) {
+        let regions = || self.kept.map_or(Ok(()), |kept| kept.check(&mesh));
+        if let Err(failure) = mesh.check(reference).and_then(|()| regions()) {
             return note(report, self.query, &failure);
         }
         let errors = TetErrors::of(self.mt, mesh.mesh);
@@ -86,7 +89,8 @@ impl<M: ApplyUpdates> Case<'_, M> {
             let levels = |field: usize| tet.map(|v| told.mesh.mesh.levels(v)[field]);
             let errors = told.errors.of_tet(t);
             let error = errors.iter().max().copied().unwrap_or_default();
-            let look = TetData { corners: &corners, levels: &levels, error, errors, update };
+            let region = told.mesh.mesh.regions().get(t as usize).copied().unwrap_or(0);
+            let look = TetData { corners: &corners, levels: &levels, error, errors, update, region };
             // What it exceeds by costs more, and is asked for only where it exceeds at all.
             if criterion.judge(&look).violates() {
                 let error = look.error_of(criterion.field());

@@ -4,7 +4,8 @@ use super::fronts::satisfy;
 use super::queries::Query;
 use tetralod::mesh::BitSet;
 use tetralod::mt::{
-    ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, MultiTessellation, UpdateId, VertexId, mix,
+    ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, MultiTessellation, ReplayError, UpdateId, VertexId,
+    canonical, mix,
 };
 use tetralod::refine::{Criterion, Front, TetData};
 
@@ -17,11 +18,15 @@ pub struct Expected {
     base: u64,
     /// By how much each update changes the hash.
     changes: Vec<u64>,
+    /// The region of each tetrahedron; empty if the MT has none.
+    regions: Vec<u16>,
 }
 
 impl Expected {
     pub fn of(mt: &impl ApplyUpdates) -> Result<Self, String> {
-        let mt = ExplicitMt::of(mt).map_err(|error| format!("the updates: {error}"))?;
+        let damaged = |error: ReplayError| format!("the updates: {error}");
+        let regions = regions_of(mt).map_err(damaged)?;
+        let mt = ExplicitMt::of(mt).map_err(damaged)?;
         let of_vertex = |v| hash_of_vertex(v, mt.position(v), mt.levels(v));
         let vertices: Vec<u64> = (0..mt.vertices()).map(VertexId).map(of_vertex).collect();
         let of_tet = |t: u32| hash_of_tet(mt.tets()[t as usize].map(|v| vertices[v as usize]));
@@ -30,7 +35,7 @@ impl Expected {
         let removed = |u| sum(mt.removed(u).iter().map(|&t| of_tet(t)));
         let change = |u| inserted(u).wrapping_sub(removed(u));
         let changes = (0..mt.updates()).map(UpdateId).map(change).collect();
-        Ok(Self { mt, base, changes })
+        Ok(Self { mt, base, changes, regions })
     }
 
     /// The hash of the mesh of a request. Which mesh is the best within a budget takes refinement to find out: from `base`, the base mesh.
@@ -77,8 +82,30 @@ impl Expected {
             mt.errors(update)
         };
         let error = errors.iter().max().copied().unwrap_or_default();
-        criterion.judge(&TetData { corners: &corners, levels: &levels, error, errors, update }).violates()
+        let region = self.regions.get(t as usize).copied().unwrap_or(0);
+        let look = TetData { corners: &corners, levels: &levels, error, errors, update, region };
+        criterion.judge(&look).violates()
     }
+}
+
+/// The region of each tetrahedron of the explicit form of an MT; empty if it has none.
+fn regions_of(mt: &impl ApplyUpdates) -> Result<Vec<u16>, ReplayError> {
+    let Some(regions) = mt.regions() else { return Ok(Vec::new()) };
+    let mut all = regions.of_base.clone();
+    let mut mesh = mt.start()?;
+    mt.updates_arrived(&mut mesh, 0);
+    for u in (0..mt.updates()).map(UpdateId) {
+        mt.refine(&mut mesh, u)?;
+        let inserted = mt.find_inserted(&mut mesh, u)?;
+        // As that form orders those of an update.
+        let named = |&t: &u32| {
+            (canonical(mesh.tets()[t as usize].map(|v| mesh.vertex(v).0)), mesh.regions()[t as usize])
+        };
+        let mut own: Vec<([u32; 4], u16)> = inserted.iter().map(named).collect();
+        own.sort_unstable();
+        all.extend(own.into_iter().map(|(_, region)| region));
+    }
+    Ok(all)
 }
 
 /// The hash of each vertex of a packed mesh.

@@ -12,6 +12,8 @@
 //! - **Valid meshes**: positive tetrahedra, faces shared by at most two, complete and symmetric adjacency, a closed
 //!   boundary, no vertex without a tetrahedron, and the topology of the reference mesh: its components, the surfaces of its boundary, the
 //!   Euler numbers of both (which give its tunnels and cavities), and the vertices at which the boundary touches itself.
+//! - **Regions**, if the MT has some: those of the input; and the interface between each two has the same area, as a vector, and the same volume
+//!   behind it in all meshes, to the last digit, unless interfaces were allowed to move.
 //! - **Error**: within the bound of each need, or what the lattices round off ([`MtInfo::floor`](tetralod::mt::MtInfo::floor)) where
 //!   that is more, at every reference vertex in its part, where the input has it.
 //!   Of those that the boundary has left outside, a place on it that is near enough counts: a displacement `d` is an error
@@ -26,6 +28,8 @@
 //!   it changes nothing.
 //! - **History**: a hundred more requests, for values all over the range (of large meshes, mostly in parts), for boxes and for cameras that
 //!   move, some with budgets, in random order: from the base mesh, from those of other requests, and by way of the reference mesh.
+//! - **Extremes**: the input has the smallest and the largest value of each field where the MT states them, and averaging fields at cells
+//!   has changed as much as it states.
 //! - **Steps**: between them the mesh is valid and within the budget.
 //!
 //! [`run_shown`] checks what a session makes of its meshes.
@@ -35,12 +39,14 @@
 mod case;
 mod deviation;
 mod expected;
+mod extremes;
 mod fronts;
 mod history;
 mod mesh_checks;
 mod parts;
 mod points;
 mod queries;
+mod regions;
 mod report;
 mod same;
 mod samples;
@@ -64,6 +70,7 @@ use fronts::{fresh, satisfy};
 use history::Numbers;
 use mesh_checks::PlainMesh;
 use queries::Query;
+use regions::KeptRegions;
 use report::note;
 use std::sync::Arc;
 use tetralod::mesh::TetMesh;
@@ -176,6 +183,7 @@ fn with<M: ApplyUpdates>(
     on_progress: &mut dyn FnMut(u32, u32),
 ) -> VerifyReport {
     VerifyReport::of(|report| {
+        extremes::check(mt.info(), input, report);
         let mut check = |input: &TetMesh| verify(mt, input, &plan(input), on_progress, report);
         match reference {
             Reference::Mesh => check(input),
@@ -194,7 +202,9 @@ fn verify<M: ApplyUpdates>(
 ) -> Result<(), String> {
     let mut deviation = Deviation::new(mt.info(), input, *vertices)?;
     let untouched = fresh(mt)?;
-    let (reference, base) = check_full_circle(mt, &deviation, report)?;
+    let kept = mt.regions().map(|regions| KeptRegions::of(regions, &PlainMesh::of(untouched.mesh())));
+    let kept = kept.transpose()?;
+    let (reference, base) = check_full_circle(mt, &deviation, (kept.as_ref(), input), report)?;
     check_order(mt, report);
     let expected = Expected::of(mt)?;
     let first = queries.len() as u32;
@@ -208,7 +218,7 @@ fn verify<M: ApplyUpdates>(
         let outcome = walk.answer(query, report)?;
         excesses[i] = outcome.excess;
         report.queries += 1;
-        Case { mt, query, front: &walk.front, outcome: &outcome }.check(
+        Case { mt, query, front: &walk.front, outcome: &outcome, kept: kept.as_ref() }.check(
             &base,
             &reference,
             &mut deviation,
@@ -254,6 +264,7 @@ fn check_monotone(queries: &[Query], excesses: &[f64], report: &mut VerifyReport
 fn check_full_circle(
     mt: &impl ApplyUpdates,
     deviation: &Deviation<'_>,
+    (kept, input): (Option<&KeptRegions<'_>>, &TetMesh),
     report: &mut VerifyReport,
 ) -> Result<(mesh_checks::Shape, Front), String> {
     let mut front = fresh(mt)?;
@@ -266,6 +277,11 @@ fn check_full_circle(
     }
     let extracted = PlainMesh::of(front.mesh());
     if let Err(failure) = same::check(&extracted, &deviation.reference()) {
+        note(report, &full, &failure);
+    }
+    let checked =
+        kept.map_or(Ok(()), |kept| kept.check_reference(&extracted, (&deviation.reference(), input)));
+    if let Err(failure) = checked {
         note(report, &full, &failure);
     }
     let none = Query::new("full coarsening", Request::within(f64::INFINITY));

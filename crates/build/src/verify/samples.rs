@@ -4,6 +4,7 @@ use super::deviation::{Deviation, check_counts};
 use super::history::Numbers;
 use super::mesh_checks::{PlainMesh, PlainReference, Shape};
 use super::queries::Query;
+use super::regions::KeptRegions;
 use super::{Case, VerifyReport, fresh, note, satisfy};
 use std::collections::BTreeSet;
 use tetralod::geom::{Bounds, LatticeBox, tet_meets_box};
@@ -91,7 +92,9 @@ fn check<M: ApplyUpdates>(
     if outcome.missing {
         note(report, query, "blocks that it needs are not here");
     }
-    Case { mt, query, front: &front, outcome: &outcome }.check(&base, &shape, &mut deviation, report);
+    let kept = mt.regions().map(|regions| KeptRegions::of(regions, &plain)).transpose()?;
+    let case = Case { mt, query, front: &front, outcome: &outcome, kept: kept.as_ref() };
+    case.check(&base, &shape, &mut deviation, report);
     report.queries += 1;
     let exact = |(_, need): &(Bounds, &Need)| need.error == 0.0 && matches!(need.part, Part::Region(_));
     if let Some((inside, _)) = around.filter(exact)

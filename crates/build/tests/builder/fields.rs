@@ -252,7 +252,8 @@ fn a_vector_brings_its_components_and_a_field_its_time_steps() {
         fields: fields.iter().map(|&name| name.to_owned()).collect(),
         ..BuildConfig::of(MtKind::Edge)
     };
-    assert_eq!(names(named(&[])), ["f0"]);
+    // Of a vector, its length.
+    assert_eq!(names(named(&[])), ["f2"]);
     assert_eq!(names(named(&["p", "U"])), ["p", "p", "f0", "f1"]);
     assert_eq!(names(named(&["f1", "U", "f2"])), ["f1", "f0", "f2"]);
     assert_eq!(names(BuildConfig { all_fields: true, ..named(&["p"]) }), ["p", "p", "f0", "f1"]);

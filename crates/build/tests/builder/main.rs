@@ -7,6 +7,7 @@ mod flat_boundaries;
 mod measure;
 mod parts;
 mod pieces;
+mod regions;
 mod repair;
 mod restrictions;
 #[path = "../../../../tests/support/mod.rs"]

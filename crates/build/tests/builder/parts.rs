@@ -113,6 +113,36 @@ fn one_part_is_the_whole() {
 }
 
 #[test]
+fn parts_state_the_extremes_of_the_whole() {
+    let (_, mut mesh) = meshes().into_iter().nth(1).expect("a mesh");
+    mesh.cell_fields = vec![Field::new("m", (0..mesh.tets.len()).map(|t| (t % 11) as f64).collect())];
+    mesh.cells_to_points();
+    let config = BuildConfig { all_fields: true, ..BuildConfig::default() };
+    let whole = tetralod_build::build(&mesh, &config).expect("a valid mesh").mt;
+    assert!(whole.info().fields.iter().all(|field| field.extremes.is_some()));
+    assert_eq!(whole.info().averaged_fields().len(), 1);
+    let built = in_parts(&mesh, &config, 8);
+    for (found, expected) in built.mt.info().fields.iter().zip(&whole.info().fields) {
+        assert_eq!((&found.extremes, &found.averaged), (&expected.extremes, &expected.averaged));
+    }
+    // And the promise is checked.
+    let report = verify::run(&built.mt, &mesh, Reference::Mesh, &mut |_, _| {});
+    assert!(report.valid, "{:#?}", report.failures);
+    let failures = |change: &dyn Fn(&mut TetMesh)| {
+        let mut other = mesh.clone();
+        change(&mut other);
+        verify::run_requests(&built.mt, &other, Reference::Mesh, &[], &mut |_, _| {}).failures
+    };
+    assert_eq!(failures(&|_| {}), [""; 0]);
+    let named = |failures: &[String]| failures.iter().filter(|text| text.starts_with("extremes of")).count();
+    assert_eq!(named(&failures(&|mesh| mesh.fields[0].values.iter_mut().for_each(|x| *x += 1e-9))), 1);
+    assert_eq!(named(&failures(&|mesh| mesh.positions.iter_mut().for_each(|p| p[0] += 1e-9))), 3);
+    let least =
+        |mesh: &mut TetMesh| mesh.fields[2].averaged.iter_mut().for_each(|of| of.input.min.value -= 1.0);
+    assert_eq!(named(&failures(&least)), 1);
+}
+
+#[test]
 fn parts_make_one_mt_that_keeps_every_promise() {
     for (name, mesh) in meshes() {
         let config = BuildConfig { all_fields: true, ..BuildConfig::default() };

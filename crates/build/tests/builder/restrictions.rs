@@ -116,14 +116,19 @@ fn labelled(regions: Regions) -> TetMesh {
     mesh
 }
 
-/// Six times the volume of each region in steps of the lattice, exactly. Each cell must be in one region as a whole.
-fn volumes(info: &MtInfo, mesh: &CurrentMesh, region_of: impl Fn([f64; 3]) -> i64) -> BTreeMap<i64, i128> {
-    let mut volumes = BTreeMap::new();
-    for tet in mesh.tets() {
+/// Six times the volume of each region in steps of the lattice, exactly. Each cell must be in one region as a whole, that which the mesh
+/// says where it has regions.
+fn volumes(mt: &Mt, mesh: &CurrentMesh, region_of: impl Fn([f64; 3]) -> i64) -> BTreeMap<i64, i128> {
+    let (info, mut volumes) = (mt.info(), BTreeMap::new());
+    assert_eq!(mt.regions().is_some(), info.kind == MtKind::HalfEdge, "these are stored");
+    for (t, tet) in mesh.tets().iter().enumerate() {
         let lattice = tet.map(|v| mesh.positions()[v as usize]);
         let corners = lattice.map(|q| info.lattice.point(q));
         let middle = centre(corners);
         let region = region_of(middle);
+        if let Some(regions) = mt.regions() {
+            assert_eq!(regions.all[usize::from(mesh.regions()[t])].labels, [region], "{corners:?}");
+        }
         // All over the cell, but not on the interfaces that it touches.
         for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
             for part in [0.3, 0.6, 0.99] {
@@ -160,7 +165,7 @@ fn regions_keep_their_volumes_and_no_cell_is_in_two() {
             let mt = made(&mesh, &BuildConfig { preserve: vec!["material".into()], ..config });
             let mut whole = None;
             at_all_errors(&mt, |mesh, error| {
-                let found = volumes(mt.info(), mesh, |p| regions(block(p)));
+                let found = volumes(&mt, mesh, |p| regions(block(p)));
                 assert_eq!(*whole.get_or_insert(found.clone()), found, "{name} at error {error}");
             });
             let base = mt.base().tets.len();
@@ -213,7 +218,7 @@ fn interfaces_that_bend_beside_straight_lines_stay() {
         let mt = made(&mesh, &BuildConfig { preserve: vec!["material".into()], ..config });
         let mut whole = None;
         at_all_errors(&mt, |mesh, error| {
-            let found = volumes(mt.info(), mesh, beside_raised);
+            let found = volumes(&mt, mesh, beside_raised);
             assert_eq!(*whole.get_or_insert(found.clone()), found, "at error {error}");
         });
     }
@@ -239,7 +244,7 @@ fn parts_keep_regions_and_points() {
             assert!(report.valid, "{name}, {parts}: {:#?}", report.failures);
             let mut first = None;
             at_all_errors(&mt, |mesh, error| {
-                let found = volumes(mt.info(), mesh, |p| regions(block(p)));
+                let found = volumes(&mt, mesh, |p| regions(block(p)));
                 assert_eq!(*first.get_or_insert(found.clone()), found, "{name}, {parts} at error {error}");
                 for place in &config.keep_points {
                     let q = mt.info().lattice.nearest(*place);
@@ -265,7 +270,7 @@ fn labels_at_points_part_cells_by_the_least_one() {
     let mt = made(&mesh, &BuildConfig { preserve: vec!["material".into()], ..BuildConfig::default() });
     let mut whole = None;
     at_all_errors(&mt, |mesh, error| {
-        let found = volumes(mt.info(), mesh, |p| regions(block(p)));
+        let found = volumes(&mt, mesh, |p| regions(block(p)));
         assert_eq!(found.len(), 2);
         assert_eq!(*whole.get_or_insert(found.clone()), found, "at error {error}");
     });
@@ -312,15 +317,20 @@ struct Body {
 }
 
 impl Body {
-    fn of(info: &MtInfo, mesh: &CurrentMesh, side: impl Fn([i32; 3]) -> i32) -> Self {
+    fn of(mt: &Mt, mesh: &CurrentMesh, side: impl Fn([i32; 3]) -> i32) -> Self {
+        let info = mt.info();
         let mut body = Self::default();
         let mut faces: BTreeMap<[[i32; 3]; 3], Vec<i32>> = BTreeMap::new();
-        for tet in mesh.tets() {
+        for (t, tet) in mesh.tets().iter().enumerate() {
             let corners = tet.map(|v| mesh.positions()[v as usize]);
             let sides = corners.map(&side);
             assert!(!(sides.contains(&-1) && sides.contains(&1)), "a cell is in both regions: {corners:?}");
             let own: i32 = sides.iter().sum::<i32>().signum();
             let [a, b, c, d] = corners.map(|q| DVec3::from_array(info.lattice.point(q)));
+            if let (false, Some(regions)) = (own == 0, mt.regions()) {
+                // Inside the label is 1.
+                assert_eq!(regions.all[usize::from(mesh.regions()[t])].labels, [i64::from(own < 0)]);
+            }
             if own <= 0 {
                 body.volumes[usize::from(own == 0)] += (b - a).cross(c - a).dot(d - a) / 6.0;
             }
@@ -360,10 +370,11 @@ fn curved_interfaces_move_within_their_tolerance() {
             mesh.positions.iter().zip(&sides).map(|(p, side)| (info.lattice.nearest(*p), *side)).collect();
         let moved = result.summary.interface_deviation;
         assert!(moved <= within && (moved > 0.0) == (within > 0.0), "{moved} of {within}");
+        assert_eq!(result.mt.regions().map(|regions| regions.deviation), Some(moved));
         let step = info.lattice.step.iter().fold(0.0, |most: f64, step| step.max(most));
         let (mut whole, mut vertices) = (None, 0);
         at_all_errors(&result.mt, |current, error| {
-            let body = Body::of(info, current, |q| side_of[&q]);
+            let body = Body::of(&result.mt, current, |q| side_of[&q]);
             let [sure, perhaps] = body.volumes;
             let whole = *whole.get_or_insert(sure + perhaps);
             // The body's surface is less than that of a cube of side 0.5.

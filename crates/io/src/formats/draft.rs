@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::mem::take;
 
-use crate::cells::{self, CellList, Indices, Numbering};
+use crate::cells::{self, CellList, Indices};
 use crate::error::{ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::number::points_from;
+use crate::numbering::Numbering;
 use crate::{CellData, ReadOptions};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
@@ -45,17 +46,10 @@ impl<'a> Draft<'a> {
 
     /// Which of so many points a cell uses; all if there are no cells.
     pub fn used(&self, points: usize) -> Vec<bool> {
-        let listed = self.list.connectivity.part(0..usize::MAX);
-        let mut used = vec![listed.is_empty(); points];
-        for &point in listed.iter() {
-            if let Some(used) = usize::try_from(point).ok().and_then(|point| used.get_mut(point)) {
-                *used = true;
-            }
-        }
-        used
+        if self.list.types.is_empty() { vec![true; points] } else { self.list.used(points) }
     }
 
-    /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has.
+    /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has; a polyhedron with its faces.
     pub fn add_cell(&mut self, kind: i64, points: impl IntoIterator<Item = i64>) {
         self.list.types.push(kind);
         let mut listed = take(&mut self.list.connectivity).into_list();
@@ -101,11 +95,11 @@ impl<'a> Draft<'a> {
     pub fn finish(mut self) -> Result<TetMesh, ReadReason> {
         let memory = &self.options.memory;
         memory.take(8 * self.coordinates.len() as u64)?;
-        let positions = points_from(&self.coordinates);
+        let mut positions = points_from(&self.coordinates);
         if positions.len() > u32::MAX as usize {
             return Err(ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) });
         }
-        let fields = expect_values(self.fields.fields, positions.len())?;
+        let mut fields = expect_values(self.fields.fields, positions.len())?;
         let has_flat = self.flat.iter().any(|(kind, count)| *count > 0 && !cells::are_points(&[*kind]));
         if self.list.types.is_empty() && has_flat {
             return Err(ReadReason::CellTypes(self.flat.into_iter().collect()));
@@ -124,7 +118,7 @@ impl<'a> Draft<'a> {
         let cells = self.list.types.len();
         cells::checked_ends(&self.list.types, &self.list.ends)?;
         let numbering = Numbering::From { first: 0, points: positions.len() };
-        let split = self.list.split(&numbering, memory)?;
+        let split = self.list.split(&numbering, &mut positions, &mut fields, memory)?;
         let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
         check_finite_cells(&cell_fields, |_| true)?;
         split.spread(&mut cell_fields);

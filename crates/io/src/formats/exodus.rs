@@ -1,16 +1,20 @@
 //! Exodus II (`.exo`, `.ex2`, `.e`): blocks of elements with variables at nodes and elements, in netCDF of any version.
 //!
-//! The numbers of blocks become the field `block` at cells. Variables whose names differ in a last letter x, y or z are a vector.
+//! The faces of polyhedra (`NFACED`) are in blocks of their own. The numbers of blocks become the field `block` at cells. Variables
+//! whose names differ in a last letter x, y or z are a vector; six with xx, yy, zz, xy, yz, zx a symmetric tensor, nine any.
 
 use std::collections::HashMap;
 
 use netcdf_reader::{NcFile, NcGroup, NcSliceInfo, NcSliceInfoElem, NcVariable};
 
 use crate::ReadOptions;
+use crate::cell_types::POLYHEDRON;
 use crate::error::{At, ReadError, ReadReason, expect_count};
+use crate::fields::component_name;
 use crate::formats::draft::Draft;
 use crate::formats::exodus_cells::{Element, element};
 use crate::formats::hdf5_values::{checked_times, netcdf_reason};
+use crate::polyhedra::SharedFaces;
 use tetralod::mesh::TetMesh;
 
 /// A file.
@@ -49,8 +53,16 @@ pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, Read
         reader.variables_at_elements(&blocks, &mut draft)?;
     }
     let numbers = reader.numbers_of_blocks(&blocks).at(|| "eb_prop1".into())?;
-    draft.at_cells("block", 1, true, || Ok(numbers)).at(|| "eb_prop1".into())?;
+    let of_blocks = || blocks.iter().zip(&numbers);
+    let of_elements = of_blocks().flat_map(|(block, number)| std::iter::repeat_n(*number, block.elements));
+    draft.at_cells("block", 1, true, || Ok(of_elements.collect())).at(|| "eb_prop1".into())?;
     let mut mesh = draft.finish().at(|| "element blocks".into())?;
+    // What cannot be read of them is no part of the mesh.
+    let names = reader.names("eb_names").unwrap_or_default();
+    for (block, number) in of_blocks() {
+        let name = names.get(block.number.wrapping_sub(1)).map_or("", String::as_str);
+        mesh.input.name_label("block", *number as i64, name);
+    }
     let time = times.get(options.step).copied();
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
@@ -121,23 +133,82 @@ impl<'a> Reader<'a> {
 
     /// Reads the blocks of elements. What has no volume is left out.
     fn blocks(&self, draft: &mut Draft<'_>) -> Result<Vec<Block>, ReadError> {
-        let number = |name: &str, start: &str| name.strip_prefix(start)?.parse::<usize>().ok();
-        let names = || self.root.variables.iter().map(NcVariable::name);
-        if let Some(faces) = names().find(|name| number(name, "facconn").is_some()) {
-            let polyhedra =
-                self.variable(faces).map_or(0, |faces| faces.shape().first().copied().unwrap_or(0));
-            return Err(ReadReason::CellTypes(vec![(POLYHEDRON, polyhedra)])).at(|| faces.to_owned());
+        let [ordinary, polyhedra] = ["connect", "facconn"].map(|start| self.numbers_behind(start));
+        let mut faces = SharedFaces::default();
+        if !polyhedra.is_empty() {
+            faces = self.faces().at(|| "fbconn".into())?;
         }
-        let mut numbers: Vec<usize> = names().filter_map(|name| number(name, "connect")).collect();
+        let ordinary = ordinary.into_iter().map(|number| (number, "connect"));
+        let mut numbers: Vec<_> =
+            ordinary.chain(polyhedra.into_iter().map(|number| (number, "facconn"))).collect();
         numbers.sort_unstable();
         let mut blocks = Vec::new();
-        for number in numbers {
-            let name = format!("connect{number}");
-            if let Some(elements) = self.block(&name, draft).at(|| name.clone())? {
-                blocks.push(Block { number, elements });
-            }
+        for (number, start) in numbers {
+            let name = format!("{start}{number}");
+            let elements = if start == "connect" {
+                self.block(&name, draft).at(|| name.clone())?
+            } else {
+                Some(self.polyhedra(number, &mut faces, draft).at(|| name.clone())?)
+            };
+            blocks.extend(elements.map(|elements| Block { number, elements }));
         }
         Ok(blocks)
+    }
+
+    /// The numbers of the variables whose names begin so.
+    fn numbers_behind(&self, start: &str) -> Vec<usize> {
+        let number = |name: &str| name.strip_prefix(start)?.parse::<usize>().ok();
+        let mut numbers: Vec<usize> =
+            self.root.variables.iter().filter_map(|variable| number(variable.name())).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        numbers
+    }
+
+    /// Numbers that count from 1, from 0 on.
+    fn counted_from_zero(&self, name: &str) -> Result<Vec<i64>, ReadReason> {
+        Ok(self.values(name, &[])?.into_iter().map(|number| (number as i64).saturating_sub(1)).collect())
+    }
+
+    /// Where each of some parts ends in a list, from how long they are, behind others.
+    fn ends(&self, name: &str, before: i64) -> Result<Vec<i64>, ReadReason> {
+        let mut end = before;
+        let counts = self.values(name, &[])?.into_iter();
+        Ok(counts
+            .map(|count| {
+                end = end.saturating_add(count as i64);
+                end
+            })
+            .collect())
+    }
+
+    /// The faces of all blocks of them.
+    fn faces(&self) -> Result<SharedFaces, ReadReason> {
+        let mut faces = SharedFaces::default();
+        for number in self.numbers_behind("fbconn") {
+            faces.ends.extend(self.ends(&format!("fbepecnt{number}"), faces.connectivity.len() as i64)?);
+            faces.connectivity.extend(self.counted_from_zero(&format!("fbconn{number}"))?);
+        }
+        Ok(faces)
+    }
+
+    /// Reads a block of polyhedra, which have some of these faces; returns how many.
+    fn polyhedra(
+        &self,
+        number: usize,
+        faces: &mut SharedFaces,
+        draft: &mut Draft<'_>,
+    ) -> Result<usize, ReadReason> {
+        faces.of_cells = self.counted_from_zero(&format!("facconn{number}"))?;
+        faces.cell_ends = self.ends(&format!("ebepecnt{number}"), 0)?;
+        let lists = faces.lists()?;
+        let mut start = 0;
+        for &end in &lists.ends {
+            let end = end as usize;
+            draft.add_cell(POLYHEDRON, lists.numbers[start..end].iter().copied());
+            start = end;
+        }
+        Ok(lists.ends.len())
     }
 
     /// Reads a block; returns how many elements it has, or none if they have no volume.
@@ -163,12 +234,12 @@ impl<'a> Reader<'a> {
         Ok(Some(list.len() / points))
     }
 
-    /// The number of each element's block, by which users know it.
+    /// The numbers of blocks, by which users know them.
     fn numbers_of_blocks(&self, blocks: &[Block]) -> Result<Vec<f64>, ReadReason> {
         let known = self.values_if("eb_prop1")?.unwrap_or_default();
         let number =
             |block: &Block| known.get(block.number.wrapping_sub(1)).copied().unwrap_or(block.number as f64);
-        Ok(blocks.iter().flat_map(|block| std::iter::repeat_n(number(block), block.elements)).collect())
+        Ok(blocks.iter().map(number).collect())
     }
 
     /// The names in an array of text.
@@ -223,9 +294,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// VTK's number for a polyhedron.
-const POLYHEDRON: i64 = 42;
-
 fn expect(expected: usize, values: Vec<f64>) -> Result<Vec<f64>, ReadReason> {
     expect_count("values", expected, values.len())?;
     Ok(values)
@@ -244,30 +312,37 @@ fn interleaved(
     Ok((0..tuples).flat_map(|i| arrays.iter().map(move |array| array[i])).collect())
 }
 
-/// The variables with the numbers of their arrays, those of a vector together.
+/// The variables with the numbers of their arrays, those of a tensor or vector together, in the order of its components.
 fn joined(names: &[String]) -> Vec<(String, Vec<usize>)> {
     let mut list = Vec::new();
     let mut at = 0;
     while let Some(name) = names.get(at) {
-        let vector = names.get(at..at + 3).and_then(vector_of);
-        let count = if vector.is_some() { 3 } else { 1 };
-        list.push((vector.unwrap_or(name).to_owned(), (at..at + count).collect()));
-        at += count;
+        let whole = [9, 6, 3].into_iter().find_map(|count| whole(names.get(at..at + count)?));
+        let (name, parts) = whole.unwrap_or((name, vec![0]));
+        list.push((name.to_owned(), parts.iter().map(|part| at + part).collect()));
+        at += parts.len();
     }
     list
 }
 
-/// The name of the vector whose components have these names, if they are such.
-fn vector_of(names: &[String]) -> Option<&str> {
-    let start = |(name, axis): (&'_ String, char)| -> Option<usize> {
-        let start = name.strip_suffix(axis).or_else(|| name.strip_suffix(axis.to_ascii_uppercase()));
-        start.map(str::len)
+/// The name of the tensor or vector whose components have these names, and which of them is which component.
+fn whole(names: &[String]) -> Option<(&str, Vec<usize>)> {
+    let letters = if names.len() == 3 { 1 } else { 2 };
+    let parts: Option<Vec<_>> =
+        names.iter().map(|name| name.split_at_checked(name.len().checked_sub(letters)?)).collect();
+    let parts = parts?;
+    let first = parts.first()?.0;
+    let endings: Vec<_> = parts.iter().map(|(_, ending)| ending.to_ascii_lowercase()).collect();
+    let place = |c: usize| {
+        let wanted = component_name(names.len(), c);
+        // Of a symmetric tensor either half is written.
+        let mirrored: String = wanted.chars().rev().collect();
+        endings.iter().position(|ending| *ending == wanted || names.len() == 6 && *ending == mirrored)
     };
-    let ends = names.iter().zip(['x', 'y', 'z']).map(start).collect::<Option<Vec<_>>>()?;
-    let first = names.first()?.get(..*ends.first()?)?;
-    let same = names.iter().zip(&ends).all(|(name, &end)| name.get(..end) == Some(first));
+    let order: Vec<usize> = (0..names.len()).map(place).collect::<Option<_>>()?;
     let stem = first.trim_end_matches(['_', '-', '.', ' ']);
-    (same && !stem.is_empty()).then_some(stem)
+    let is_one = parts.iter().all(|(start, _)| *start == first) && !stem.is_empty();
+    is_one.then_some((stem, order))
 }
 
 #[cfg(test)]
@@ -284,6 +359,15 @@ mod tests {
         assert_eq!(names(&["T", "DISPLX", "DISPLY", "DISPLZ"]), [of("T", &[0]), of("DISPL", &[1, 2, 3])]);
         assert_eq!(names(&["vel_x", "vel_y", "vel_z", "ü"]), [of("vel", &[0, 1, 2]), of("ü", &[3])]);
         assert_eq!(names(&["x", "y", "z"]), [of("x", &[0]), of("y", &[1]), of("z", &[2])]);
+        let stress = ["Sxx", "Syy", "Szz", "Sxy", "Syz", "Szx"];
+        assert_eq!(names(&stress), [of("S", &[0, 1, 2, 3, 4, 5])]);
+        assert_eq!(names(&["S_XX", "S_YY", "S_ZZ", "S_XY", "S_YZ", "S_XZ", "p"]).len(), 2);
+        assert_eq!(names(&stress[..5]).len(), 5);
+        let by_rows = ["sxx", "sxy", "sxz", "syy", "syz", "szz"];
+        assert_eq!(names(&by_rows), [of("s", &[0, 3, 5, 1, 4, 2])]);
+        let nine = ["g_xx", "g_xy", "g_xz", "g_yx", "g_yy", "g_yz", "g_zx", "g_zy", "g_zz"];
+        assert_eq!(names(&nine), [of("g", &[0, 1, 2, 3, 4, 5, 6, 7, 8])]);
+        assert_eq!(names(&["vz", "vx", "vy"]), [of("v", &[1, 2, 0])]);
         assert_eq!(names(&["ax", "ay", "bz"]).len(), 3);
         assert_eq!(names(&["ax", "ay"]).len(), 2);
         assert_eq!(names(&["", "", ""]).len(), 3);

@@ -2,7 +2,7 @@
 //! order; views at nodes, elements and nodes of elements, with their time steps. Elements without a volume are left out, as are
 //! partitions and periodicity. By <https://gmsh.info/doc/texinfo/gmsh.html#Gmsh-file-formats>.
 //!
-//! The numbers of geometric entities become the field `entity` at cells, those of physical groups `physical`.
+//! The numbers of geometric entities become the field `entity` at cells, those of physical groups `physical`, with their names.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -70,8 +70,7 @@ pub(super) fn is_first(bytes: &[u8]) -> bool {
 }
 
 /// Sections that change neither places nor values.
-const HARMLESS: [&str; 7] = [
-    "$PhysicalNames",
+const HARMLESS: [&str; 6] = [
     "$Comments",
     "$Periodic",
     "$Parametrizations",
@@ -88,6 +87,7 @@ impl Mesh<'_> {
             "$MeshFormat" => self.layout = Some(read_format(file)?),
             // These sections are of version 1 alone.
             "$NOD" | "$ELM" => return Err(unsupported("1")),
+            "$PhysicalNames" => self.read_names(file)?,
             "$Entities" => read_entities(self, &mut numbers.ok_or_else(missing)?)?,
             "$Nodes" => read_nodes(self, &mut numbers.ok_or_else(missing)?)?,
             "$Elements" => read_elements(self, &mut numbers.ok_or_else(missing)?)?,
@@ -105,6 +105,18 @@ impl Mesh<'_> {
             other => return Err(ReadReason::Syntax(format!("\"{}\" instead of a section", shown(other)))),
         }
         expect_end(file, name)
+    }
+
+    /// Reads the names of physical groups up to the end of their section, which is text in binary files, too: those of volumes are kept.
+    fn read_names(&mut self, file: &mut Scanner<'_>) -> Result<(), ReadReason> {
+        for _ in 0..file.number::<u64>()? {
+            let [dimension, group] = file.numbers::<i64, 2>()?;
+            let line = String::from_utf8_lossy(file.line().trim_ascii()).into_owned();
+            if dimension == 3 {
+                self.names.push((group, line.trim_matches('"').to_owned()));
+            }
+        }
+        Ok(())
     }
 
     /// Steps over a section, and notes that it is left out if its content is of use.
@@ -151,6 +163,7 @@ impl Mesh<'_> {
         let skipped = self.skipped.into_iter().map(|name| format!("section {name} is left out"));
         self.draft.notes.extend(skipped);
         let mut mesh = self.draft.finish().at(|| "$Elements".into())?;
+        self.names.iter().for_each(|(group, name)| mesh.input.name_label("physical", *group, name));
         let time = steps.times.get(step).copied();
         mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
         Ok(mesh)
@@ -421,6 +434,9 @@ mod tests {
         }
         let mesh = read(TWO.as_bytes(), &everything()).unwrap();
         assert!(mesh.cell_fields.iter().any(|f| f.name == "physical" && f.values == [6.0]));
+        let named = TWO.replace("$PhysicalNames\n1\n3 1", "$PhysicalNames\n2\n2 6 \"wall\"\n3 6");
+        let names = read(named.as_bytes(), &everything()).unwrap().input.label_names;
+        assert_eq!(names["physical"], [(6, "a $b".to_owned())].into());
     }
 
     #[test]

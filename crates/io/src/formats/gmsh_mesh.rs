@@ -25,6 +25,8 @@ pub(super) struct Mesh<'a> {
     pub element_nodes: Option<HashMap<i64, Vec<i64>>>,
     pub heads: Vec<Head>,
     pub views: Vec<View>,
+    /// The names of physical groups of volumes.
+    pub names: Vec<(i64, String)>,
     /// Sections that are left out.
     pub skipped: Vec<String>,
 }
@@ -44,6 +46,7 @@ impl<'a> Mesh<'a> {
             element_nodes: None,
             heads: Vec::new(),
             views: Vec::new(),
+            names: Vec::new(),
             skipped: Vec::new(),
         }
     }

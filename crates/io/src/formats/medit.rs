@@ -365,11 +365,11 @@ mod tests {
             ("sol_xz", 20.0),
         ];
         assert_eq!(found[..6], tensor);
-        assert_eq!(found[7..10], [("sol_2_x", 5.0), ("sol_2_y", 6.0), ("sol_2_z", 7.0)]);
-        assert_eq!(found[11..14], [("sol_3_xx", 11.0), ("sol_3_xy", 12.0), ("sol_3_xz", 13.0)]);
+        assert_eq!(found[11..14], [("sol_2_x", 5.0), ("sol_2_y", 6.0), ("sol_2_z", 7.0)]);
+        assert_eq!(found[15..18], [("sol_3_xx", 11.0), ("sol_3_xy", 12.0), ("sol_3_xz", 13.0)]);
         let vectors: Vec<_> =
             mesh.fields.iter().filter_map(|f| Some(f.vector.as_ref()?.name.as_str())).collect();
-        assert_eq!([vectors[0], vectors[7], vectors[11]], ["sol", "sol_2", "sol_3"]);
+        assert_eq!([vectors[0], vectors[11], vectors[15]], ["sol", "sol_2", "sol_3"]);
     }
 
     /// Two tetrahedra of ten points and one of four in a cube's corner; points at edges in VTK's order.

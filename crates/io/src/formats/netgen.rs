@@ -1,5 +1,5 @@
-//! Netgen's meshes (`.vol`): linear cells, and quadratic tetrahedra, pyramids and prisms. The number of the material becomes the field `material` at cells.
-//! Elements without a volume, names, and the curves of cells are left out.
+//! Netgen's meshes (`.vol`): linear cells, and quadratic tetrahedra, pyramids and prisms. The number of the material becomes the field `material` at cells,
+//! with the names of materials. Elements without a volume, other names, and the curves of cells are left out.
 
 use crate::ReadOptions;
 use crate::error::{At, ReadError, ReadReason};
@@ -29,12 +29,16 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     let mut file = Scanner::with_comments(bytes);
     let mut draft = Draft::new(options);
     let read = read_mesh(&mut file, &mut draft);
-    read.at(|| file.line_number())?;
-    draft.finish().at(String::new)
+    let names = read.at(|| file.line_number())?;
+    let mut mesh = draft.finish().at(String::new)?;
+    names.iter().for_each(|(number, name)| mesh.input.name_label("material", *number, name));
+    Ok(mesh)
 }
 
-fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadReason> {
+/// Reads all sections; returns the names of materials.
+fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<Vec<(i64, String)>, ReadReason> {
     let mut materials = Vec::new();
+    let mut names = Vec::new();
     while let Some(word) = file.next_word()? {
         match word {
             "endmesh" => break,
@@ -59,8 +63,17 @@ fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRe
                     draft.coordinates.extend(file.numbers::<f64, 3>()?);
                 }
             }
+            "materials" => {
+                for _ in 0..file.number::<usize>()? {
+                    if file.rest().is_empty() {
+                        break;
+                    }
+                    let number = file.number::<i64>()?;
+                    names.push((number, String::from_utf8_lossy(file.line().trim_ascii()).into_owned()));
+                }
+            }
             // Names may be any words.
-            "materials" | "bcnames" | "cd2names" | "cd3names" => {
+            "bcnames" | "cd2names" | "cd3names" => {
                 let count: usize = file.number()?;
                 file.skip_line();
                 for _ in 0..count {
@@ -80,7 +93,8 @@ fn read_mesh(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRe
     if draft.coordinates.is_empty() {
         return Err(ReadReason::Missing("section points".into()));
     }
-    draft.at_cells("material", 1, true, || Ok(materials))
+    draft.at_cells("material", 1, true, || Ok(materials))?;
+    Ok(names)
 }
 
 /// VTK's type of triangles: what surfaces are mostly of.
@@ -124,6 +138,9 @@ mod tests {
             (mesh.cell_fields[0].name.as_str(), &mesh.cell_fields[0].values),
             ("material", &vec![7.0])
         );
+        let named = read_text(&MESH.replace("1\n1 steel", "2\n7 cast iron\n8 "));
+        let names = named.unwrap().input.label_names;
+        assert_eq!(names["material"], [(7, "cast iron".to_owned())].into());
         (0..MESH.len()).for_each(|length| drop(read_text(&MESH[..length])));
     }
 

@@ -9,7 +9,7 @@ use std::ops::Range;
 use hdf5_reader::{Dataset, Hdf5File};
 
 use crate::cell_types;
-use crate::cells::{self, CellList, Indices, Numbering};
+use crate::cells::{self, CellList, Indices};
 use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::formats::hdf5_values::{
@@ -19,6 +19,8 @@ use crate::ghosts::{GHOST_TYPE, HIDDEN_POINT};
 use crate::grid::{self, Extent, Ghosts, GridValues, Placement};
 use crate::grid_parts::cubes_of;
 use crate::number::points_from;
+use crate::numbering::Numbering;
+use crate::polyhedra::{FaceLists, SharedFaces};
 use crate::pvtu::Whole;
 use crate::vtu::{NumberPoints, first_number};
 use crate::{CellData, ReadOptions};
@@ -28,6 +30,12 @@ use tetralod::mesh::{Field, MeshInput, TetMesh};
 pub(super) const ROOT: &str = "VTKHDF";
 /// The version that this was written for; later ones of the same major version add to it.
 const MAJOR_VERSIONS: [f64; 2] = [1.0, 2.0];
+
+/// How many faces, points of faces, and faces of polyhedra a piece has, since version 2.3; and where those of a step begin.
+const FACE_COUNTS: [&str; 3] =
+    ["NumberOfFaces", "NumberOfFaceConnectivityIds", "NumberOfPolyhedronToFaceIds"];
+const FACE_BEGINNINGS: [&str; 3] =
+    ["FaceOffsetsOffsets", "FaceConnectivityOffsets", "PolyhedronToFaceIdOffsets"];
 
 /// A file, and which of its steps is read.
 struct Reader<'a> {
@@ -92,6 +100,8 @@ struct Piece {
     ids: Range<u64>,
     /// In the list of where cells begin and end.
     offsets: Range<u64>,
+    /// In the lists of where faces end, of their points, and of the faces of polyhedra.
+    faces: [Range<u64>; 3],
     /// The first of its rows in arrays at points and at cells, where they have no beginnings of their own.
     first: [u64; 2],
     /// How many points and cells come before it in its step.
@@ -180,6 +190,12 @@ impl Reader<'_> {
             let [expected, found] = [points.len() as u64, cells.len().min(ids.len()) as u64];
             return Err(ReadReason::Count { what: "pieces".into(), expected, found });
         }
+        let mut of_faces = FACE_COUNTS.map(|_| Vec::new());
+        for (list_of, name) in of_faces.iter_mut().zip(FACE_COUNTS) {
+            if self.dataset_if(name)?.is_some() {
+                *list_of = list(name)?;
+            }
+        }
         let first_part = self.beginning("PartOffsets")?.unwrap_or(0);
         let parts = self.part_count(first_part, points.len() as u64)?;
         let mut next = Piece {
@@ -187,11 +203,17 @@ impl Reader<'_> {
             cells: 0..self.beginning("CellOffsets")?.unwrap_or(0),
             ids: 0..self.beginning("ConnectivityIdOffsets")?.unwrap_or(0),
             offsets: 0..0,
+            faces: [0..0, 0..0, 0..0],
             first: [0; 2],
             before: [0; 2],
         };
         next.first = [next.points.end, next.cells.end];
         next.offsets.end = next.cells.end.saturating_add(first_part);
+        for (range, name) in next.faces.iter_mut().zip(FACE_BEGINNINGS) {
+            range.end = self.beginning(name)?.unwrap_or(0);
+        }
+        // VTK counts faces there, not where they end, of which each part has one more.
+        next.faces[0].end = next.faces[0].end.saturating_add(first_part);
         let mut pieces = Vec::new();
         for part in first_part..first_part.saturating_add(parts) {
             let size = |sizes: &[u64]| usize::try_from(part).ok().and_then(|part| sizes.get(part).copied());
@@ -199,11 +221,20 @@ impl Reader<'_> {
                 return Err(ReadReason::Missing(format!("piece {part}")));
             };
             let after = |last: &Range<u64>, size: u64| last.end..last.end.saturating_add(size);
+            // Where faces end is a list as that of cells.
+            let [faces, points_of_faces, of_cells] =
+                of_faces.each_ref().map(|sizes| size(sizes).unwrap_or(0));
+            let [last_faces, last_points, last_of_cells] = &next.faces;
             let piece = Piece {
                 points: after(&next.points, points),
                 cells: after(&next.cells, cells),
                 ids: after(&next.ids, ids),
                 offsets: after(&next.offsets, cells.saturating_add(1)),
+                faces: [
+                    after(last_faces, faces.saturating_add(1)),
+                    after(last_points, points_of_faces),
+                    after(last_of_cells, of_cells),
+                ],
                 ..next.clone()
             };
             let [a, b] = piece.before;
@@ -233,8 +264,8 @@ impl Reader<'_> {
         if let Some(listed) = &mut listed {
             self.leave_out_ghosts(listed, piece).at(|| place(GHOST_TYPE))?;
         }
-        let positions = self.positions(piece).at(|| place("Points"))?;
-        let [fields, other_fields] = self.fields("PointData", piece, &[])?;
+        let mut positions = self.positions(piece).at(|| place("Points"))?;
+        let [mut fields, other_fields] = self.fields("PointData", piece, &[])?;
         let used = || listed.as_ref().map(|listed| listed.used(positions.len()));
         check_finite(&positions, &fields, &used).at(|| place("PointData"))?;
         let [mut cell_fields, other_cell_fields] = match &listed {
@@ -249,7 +280,9 @@ impl Reader<'_> {
         };
         check_finite_cells(&cell_fields, is_there).at(|| place("CellData"))?;
         let numbering = numbers(&positions).at(|| place("Points"))?;
-        let split = listed.map(|listed| listed.split(&numbering, &self.options.memory)).transpose();
+        let memory = &self.options.memory;
+        let split =
+            listed.map(|listed| listed.split(&numbering, &mut positions, &mut fields, memory)).transpose();
         let split = split.at(|| place("Connectivity"))?.unwrap_or_default();
         split.spread(&mut cell_fields);
         let input = MeshInput { other_fields, other_cell_fields, ..split.input };
@@ -284,7 +317,29 @@ impl Reader<'_> {
         let found = cells::checked_ends(&types, &ends)?;
         expect_count("points of cells", piece.ids.end - piece.ids.start, found)?;
         let connectivity = Indices::Listed(integers(&self.dataset("Connectivity")?, piece.ids.clone())?);
-        Ok(Some(CellList { types, ends, connectivity }))
+        let has_faces = types.contains(&cell_types::POLYHEDRON);
+        let list = CellList { types, ends, connectivity };
+        Ok(Some(if has_faces { list.with_faces(&self.faces(piece)?)? } else { list }))
+    }
+
+    /// The faces of the polyhedra of a piece.
+    fn faces(&self, piece: &Piece) -> Result<FaceLists, ReadReason> {
+        let ends = |name: &str, rows: &Range<u64>| {
+            let mut ends = integers(&self.dataset(name)?, rows.clone())?;
+            if ends.first() != Some(&0) {
+                return Err(ReadReason::Syntax(format!("{name} of a piece does not begin at 0")));
+            }
+            ends.remove(0);
+            Ok(ends)
+        };
+        let [offsets, connectivity, of_cells] = &piece.faces;
+        let faces = SharedFaces {
+            connectivity: integers(&self.dataset("FaceConnectivity")?, connectivity.clone())?,
+            ends: ends("FaceOffsets", offsets)?,
+            of_cells: integers(&self.dataset("PolyhedronToFaces")?, of_cells.clone())?,
+            cell_ends: ends("PolyhedronOffsets", &piece.offsets)?,
+        };
+        faces.lists()
     }
 
     /// Leaves out the cells that VTK's flags mark as another piece's or as hidden.

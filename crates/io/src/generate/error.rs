@@ -3,13 +3,17 @@
 use thiserror::Error;
 
 /// The names of what can be generated, each with a sentence about it.
-pub const VOLUMES: [(&str, &str); 6] = [
+pub const VOLUMES: [(&str, &str); 7] = [
     ("bucky", "density of the carbon molecule C60: 60 blobs on a truncated icosahedron"),
     ("marschner-lobb", "density of Marschner and Lobb's test signal: waves at the limit of a 40³ grid"),
     ("hydrogen", "density and amplitude of an orbital of the hydrogen atom"),
     ("abc-flow", "pressure and velocity of the vortices of Arnold, Beltrami and Childress, drifting in time"),
     ("helix", "density and charge of a model of DNA; the grid is 7/3 times as high as wide"),
     ("sphere-flow", "pressure and speed of a flow past a sphere: tetrahedra, graded, around a hole"),
+    (
+        "turbine",
+        "temperature and stress in a wheel with blades in a casing: tetrahedra of twelve parts, numbered at cells",
+    ),
 ];
 
 /// The largest principal quantum number of an orbital.

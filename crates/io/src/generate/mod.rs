@@ -9,6 +9,7 @@ mod helix;
 mod hydrogen;
 mod marschner_lobb;
 mod sphere_flow;
+mod turbine;
 
 pub use error::GenerateError;
 #[doc(hidden)]
@@ -65,6 +66,9 @@ pub fn volume(name: &str, size: u32, options: &Options) -> Result<Volume, Genera
     if name == "sphere-flow" {
         return sphere_flow(size).map(|mesh| Volume::Mesh(Box::new(mesh)));
     }
+    if name == "turbine" {
+        return turbine(size).map(|mesh| Volume::Mesh(Box::new(mesh)));
+    }
     check_size(name, size, GRID_SIZES)?;
     Ok(Volume::Grid(match name {
         "bucky" => bucky::layers(size),
@@ -111,6 +115,19 @@ pub fn sphere_flow(size: u32) -> Result<TetMesh, GenerateError> {
     Ok(sphere_flow::mesh(size))
 }
 
+/// A wheel with blades on a shaft, in a casing: `temperature` and `stress` at points, and at cells `part`, a number from 1 to 12 (shaft, hub,
+/// eight blades, two halves of the casing). Its radius is 1, its axis is z; between blades, and around them, there is nothing.
+///
+/// There are `size` points along the axis, and eight times as many cells around it.
+///
+/// # Errors
+/// If `size` is less than 3, or there are too many points.
+#[doc(hidden)]
+pub fn turbine(size: u32) -> Result<TetMesh, GenerateError> {
+    check_size("turbine", size, turbine::SIZES)?;
+    Ok(turbine::mesh(size))
+}
+
 fn check_size(name: &'static str, size: u32, limits: [u32; 2]) -> Result<(), GenerateError> {
     if (limits[0]..=limits[1]).contains(&size) {
         Ok(())
@@ -150,6 +167,29 @@ mod tests {
         }
         assert_eq!(by_name("bucky", 3).unwrap().tets.len(), 48);
         assert_eq!(by_name("sphere-flow", 3).unwrap().tets.len(), 288);
+    }
+
+    #[test]
+    fn the_turbine_has_twelve_parts_that_meet_in_faces() {
+        let mesh = by_name("turbine", 13).unwrap();
+        let topology = tetralod::mesh::topology(mesh.positions.len(), &mesh.tets).unwrap();
+        let parts = &mesh.cell_fields[0].values;
+        let counts = |part: u32| parts.iter().filter(|p| **p == f64::from(part)).count();
+        assert!((1..=12).all(|part| counts(part) > 0) && (1..=12).map(counts).sum::<usize>() == parts.len());
+        assert!((4..=10).all(|blade| counts(blade) == counts(3)), "blades are alike");
+        let mut touching = std::collections::BTreeSet::new();
+        for (t, around) in topology.neighbors.iter().enumerate() {
+            let others = around.iter().filter(|n| **n != tetralod::mesh::NONE);
+            touching.extend(others.map(|&n| [parts[t], parts[n as usize]].map(|part| part as u32)));
+        }
+        let mut expected = vec![[1, 2], [11, 12]];
+        expected.extend((3..=10).map(|blade| [2, blade]));
+        let found: Vec<[u32; 2]> = touching.into_iter().filter(|[a, b]| a < b).collect();
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+        // Within what facets cut off arcs.
+        let casing = std::f64::consts::PI * (1.0 - 0.86 * 0.86) * 0.8;
+        assert!(space(&mesh) > casing && space(&mesh) < std::f64::consts::PI * 0.8);
     }
 
     #[test]

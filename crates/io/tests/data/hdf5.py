@@ -1,4 +1,4 @@
-"""Writes pieces.vtkhdf, steps.vtkhdf, image.vtkhdf, dense.vtkhdf, netcdf4.exo, and two files with groups in circles: small files in
+"""Writes pieces.vtkhdf, polyhedra.vtkhdf, steps.vtkhdf, image.vtkhdf, dense.vtkhdf, netcdf4.exo, and two files with groups in circles: small files in
 HDF5 in the layouts that programs write.
 
 Needs h5py. The same calls give the same bytes.
@@ -35,6 +35,37 @@ def pieces():
     at_points.create_dataset("sum", data=points.sum(1).astype(">f8"), **packed)
     at_points["v"] = points * 2
     at_cells["material"] = np.array([3, 5, 7], "u2")
+    file.close()
+
+
+def polyhedra():
+    """A cube as a hexahedron and one as a polyhedron on it, at two times as two pieces each; the second time is twice as high."""
+    file, group = root("polyhedra.vtkhdf", "UnstructuredGrid", "latest")
+    group.attrs["Version"] = np.array([2, 5], "i8")
+    quads = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+    cube = np.array(CUBE)
+    counts = {"Points": [8, 8], "Cells": [1, 1], "ConnectivityIds": [8, 8], "Faces": [0, 6]}
+    counts |= {"FaceConnectivityIds": [0, 24], "PolyhedronToFaceIds": [0, 6]}
+    for name, numbers in counts.items():
+        group[f"NumberOf{name}"] = np.array(2 * numbers, "i8")
+    group["Points"] = np.concatenate([cube * [1, 1, h] + [0, 0, h * z] for h in (1, 2) for z in (0, 1)]).astype("f8")
+    group["Connectivity"] = np.array([*range(8)] * 4, "i8")
+    group["Offsets"] = np.array([0, 8] * 4, "i8")
+    group["Types"] = np.array([12, 42] * 2, "u1")
+    group["FaceConnectivity"] = np.array(2 * quads, "i8").ravel()
+    group["FaceOffsets"] = np.array(2 * [0, 0, 4, 8, 12, 16, 20, 24], "i8")
+    group["PolyhedronToFaces"] = np.array(2 * [*range(6)], "i8")
+    group["PolyhedronOffsets"] = np.array(2 * [0, 0, 0, 6], "i8")
+    group.create_group("PointData")["z"] = group["Points"][:, 2]
+    times = group.create_group("Steps")
+    times.attrs["NSteps"] = 2
+    times["Values"] = np.array([0.0, 1.0])
+    times["NumberOfParts"] = np.array([2, 2], "i8")
+    beginnings = {"PartOffsets": 2, "PointOffsets": 16, "CellOffsets": 2, "ConnectivityIdOffsets": 16}
+    beginnings |= {"FaceConnectivityOffsets": 24, "PolyhedronToFaceIdOffsets": 6, "FaceOffsetsOffsets": 6}
+    for name, second in beginnings.items():
+        times[name] = np.array([0, second], "i8")
+    times.create_group("PointDataOffsets")["z"] = np.array([0, 16], "i8")
     file.close()
 
 
@@ -131,5 +162,5 @@ def cycles():
             group = child
 
 
-for write in [pieces, steps, image, dense, exodus, cycles]:
+for write in [pieces, polyhedra, steps, image, dense, exodus, cycles]:
     write()

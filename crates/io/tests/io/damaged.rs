@@ -1,6 +1,7 @@
 //! Files that are cut short, flipped or lie about their sizes: a typed error or the same mesh, never a panic.
 
 use crate::files::*;
+use crate::polyhedra;
 use tetralod::mesh;
 use tetralod::mesh::TetMesh;
 use tetralod_io as io;
@@ -40,7 +41,7 @@ pub fn files() -> Vec<(String, Vec<u8>, TetMesh)> {
 
 #[test]
 fn every_truncation_is_refused_or_harmless() {
-    for (name, file, whole) in files() {
+    for (name, file, whole) in files().into_iter().chain(polyhedra::files()) {
         for length in 0..file.len() {
             let Ok(mesh) = io::read_bytes(&name, &file[..length]) else { continue };
             // Text can be cut inside its last number, and legacy files between two arrays, without a trace.
@@ -55,7 +56,7 @@ fn every_truncation_is_refused_or_harmless() {
 #[test]
 fn no_bit_flip_panics_and_no_mesh_is_inconsistent() {
     let everything = ReadOptions { cells: CellData::Values, ..ReadOptions::default() };
-    for (name, mut file, _) in files() {
+    for (name, mut file, _) in files().into_iter().chain(polyhedra::files()) {
         for bit in 0..8 * file.len() {
             file[bit / 8] ^= 1 << (bit % 8);
             if let Ok(found) = io::read_bytes_with(&name, &file, &everything) {
@@ -225,10 +226,10 @@ fn errors_say_file_place_reason_and_remedy() {
          fields to read"
     );
     assert_eq!(
-        text("\n10 10 10 10", "\n42 42 13 5"),
-        "dir/a.vtu: piece 0, <Cells>, array \"types\": 12 cells: 1 triangle, 8 tetrahedra, 1 wedge, 2 polyhedra; \
-         tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones and Lagrange cells of the first \
-         two orders, and what has no volume is left out beside them: convert the others (in ParaView: Tetrahedralize), or save them \
+        text("\n10 10 10 10", "\n41 41 13 5"),
+        "dir/a.vtu: piece 0, <Cells>, array \"types\": 12 cells: 1 triangle, 8 tetrahedra, 1 wedge, 2 convex point sets; \
+         tetrahedra, hexahedra, voxels, wedges, pyramids, prisms and polyhedra are read, also quadratic ones and Lagrange cells of \
+         the first two orders, and what has no volume is left out beside them: convert the others (in ParaView: Tetrahedralize), or save them \
          with an order of at most 2"
     );
     assert_eq!(

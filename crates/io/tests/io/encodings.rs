@@ -165,7 +165,7 @@ fn legacy_attributes_of_every_kind() {
     {
         assert!(names.contains(&name), "{name} of {names:?}");
     }
-    assert_eq!(names.len(), 1 + 4 + 4 + 10 + 7 + 3 + 5 + 1 + 3);
+    assert_eq!(names.len(), 1 + 4 + 4 + 14 + 11 + 3 + 5 + 1 + 3);
 }
 
 #[test]

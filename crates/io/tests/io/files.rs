@@ -501,34 +501,48 @@ pub fn mixed_vtu(style: Style) -> Vec<u8> {
 
 /// The same as a legacy file.
 pub fn mixed_vtk(version: &str, binary: bool) -> Vec<u8> {
+    let lists = MIXED.map(|(_, points)| points.iter().map(|p| f64::from(*p)).collect());
+    let types = MIXED.map(|(kind, _)| f64::from(kind));
+    let at_points = &mixed_sample().fields[0].values;
+    legacy_vtk(version, binary, &MIXED_POINTS, &lists, &types, at_points, &[0.0, 1.0, 2.0, 3.0, 4.0])
+}
+
+/// An unstructured grid as a legacy file, of cells with these lists of numbers, with a field `p` at points and `m` at cells.
+pub fn legacy_vtk(
+    version: &str,
+    binary: bool,
+    points: &[[f64; 3]],
+    lists: &[Vec<f64>],
+    types: &[f64],
+    at_points: &[f64],
+    at_cells: &[f64],
+) -> Vec<u8> {
     let encoding = if binary { "BINARY" } else { "ASCII" };
+    let (n, cells) = (points.len(), lists.len());
     let mut file = format!(
-        "# vtk DataFile Version {version}\ntitle\n{encoding}\nDATASET UNSTRUCTURED_GRID\nPOINTS 12 float\n"
+        "# vtk DataFile Version {version}\ntitle\n{encoding}\nDATASET UNSTRUCTURED_GRID\nPOINTS {n} float\n"
     )
     .into_bytes();
-    file.extend(legacy_numbers(binary, "Float32", MIXED_POINTS.as_flattened()));
-    let ids: Vec<f64> = MIXED.iter().flat_map(|(_, points)| points.iter().map(|p| f64::from(*p))).collect();
+    file.extend(legacy_numbers(binary, "Float32", points.as_flattened()));
     if version.starts_with('5') {
-        file.extend(format!("CELLS 6 {}\nOFFSETS vtktypeint64\n", ids.len()).bytes());
+        let ids = lists.concat();
+        file.extend(format!("CELLS {} {}\nOFFSETS vtktypeint64\n", cells + 1, ids.len()).bytes());
         let mut offsets = vec![0.0];
-        MIXED.iter().for_each(|(_, points)| offsets.push(offsets[offsets.len() - 1] + points.len() as f64));
+        lists.iter().for_each(|list| offsets.push(offsets[offsets.len() - 1] + list.len() as f64));
         file.extend(legacy_numbers(binary, "Int64", &offsets));
         file.extend(b"CONNECTIVITY vtktypeint64\n");
         file.extend(legacy_numbers(binary, "Int64", &ids));
     } else {
-        let counted = |(_, points): &(u8, &[u32])| -> Vec<f64> {
-            std::iter::once(points.len() as f64).chain(points.iter().map(|p| f64::from(*p))).collect()
-        };
-        let list: Vec<f64> = MIXED.iter().flat_map(counted).collect();
-        file.extend(format!("CELLS 5 {}\n", list.len()).bytes());
+        let counted = |list: &Vec<f64>| [&[list.len() as f64], list.as_slice()].concat();
+        let list: Vec<f64> = lists.iter().flat_map(counted).collect();
+        file.extend(format!("CELLS {cells} {}\n", list.len()).bytes());
         file.extend(legacy_numbers(binary, "Int32", &list));
     }
-    file.extend(b"CELL_TYPES 5\n");
-    let types: Vec<f64> = MIXED.iter().map(|(kind, _)| f64::from(*kind)).collect();
-    file.extend(legacy_numbers(binary, "Int32", &types));
-    file.extend(b"CELL_DATA 5\nSCALARS m double\nLOOKUP_TABLE default\n");
-    file.extend(legacy_numbers(binary, "Float64", &[0.0, 1.0, 2.0, 3.0, 4.0]));
-    file.extend(b"POINT_DATA 12\nSCALARS p float\nLOOKUP_TABLE default\n");
-    file.extend(legacy_numbers(binary, "Float32", &mixed_sample().fields[0].values));
+    file.extend(format!("CELL_TYPES {cells}\n").bytes());
+    file.extend(legacy_numbers(binary, "Int32", types));
+    file.extend(format!("CELL_DATA {cells}\nSCALARS m double\nLOOKUP_TABLE default\n").bytes());
+    file.extend(legacy_numbers(binary, "Float64", at_cells));
+    file.extend(format!("POINT_DATA {n}\nSCALARS p float\nLOOKUP_TABLE default\n").bytes());
+    file.extend(legacy_numbers(binary, "Float32", at_points));
     file
 }

@@ -8,6 +8,7 @@ use tetralod::mesh::{Field, TetMesh};
 use tetralod_io::{self as io, CellData, FieldSelection, ReadError, ReadOptions, ReadReason};
 
 const PIECES: (&str, &[u8]) = ("pieces.vtkhdf", include_bytes!("../data/pieces.vtkhdf"));
+const POLYHEDRA: (&str, &[u8]) = ("polyhedra.vtkhdf", include_bytes!("../data/polyhedra.vtkhdf"));
 const STEPS: (&str, &[u8]) = ("steps.vtkhdf", include_bytes!("../data/steps.vtkhdf"));
 const IMAGE: (&str, &[u8]) = ("image.vtkhdf", include_bytes!("../data/image.vtkhdf"));
 const DENSE: (&str, &[u8]) = ("dense.vtkhdf", include_bytes!("../data/dense.vtkhdf"));
@@ -52,6 +53,18 @@ fn pieces_meet_and_what_has_no_volume_is_left_out() {
     assert_eq!(io::read_with(&path(PIECES.0), &everything(0)).unwrap(), mesh);
     let survey = io::survey(PIECES.0, PIECES.1).unwrap();
     assert_eq!((survey.format, survey.points, survey.cells), ("vtkhdf", 12, 12));
+}
+
+#[test]
+fn polyhedra_of_pieces_at_each_time() {
+    for (step, height) in [(0, 1.0), (1, 2.0)] {
+        let mesh = read_step(POLYHEDRA, step).unwrap();
+        assert_eq!((mesh.positions.len(), volume(&mesh)), (12, 2.0 * height));
+        assert!(mesh.positions.iter().zip(&mesh.fields[0].values).all(|(p, z)| p[2] == *z), "{step}");
+        let found = tetralod::mesh::findings(&mesh, 0.0).unwrap();
+        assert_eq!((found.components, found.open_seam_faces), (1, 0));
+        assert_eq!(io::read_with(&path(POLYHEDRA.0), &everything(step)).unwrap(), mesh);
+    }
 }
 
 #[test]
@@ -305,6 +318,79 @@ fn exodus(version: u8) -> Vec<u8> {
     let values = Values::Floats(vec![vec![4.0], vec![5.0]]);
     variables.push(variable("vals_elem_var1eb1", &["time_step", "e1"], "", values));
     netcdf(version, &dimensions, &variables, 2)
+}
+
+/// Two cubes with a face in common as polyhedra, and a pyramid on one of them.
+fn exodus_polyhedra(change: impl Fn(&str, &mut Vec<i32>)) -> Vec<u8> {
+    let dimensions = [
+        ("time_step", 0),
+        ("num_dim", 3),
+        ("num_nodes", 13),
+        ("num_el_blk", 2),
+        ("quads", 11),
+        ("quad_nodes", 44),
+        ("cells", 2),
+        ("cell_faces", 12),
+        ("e2", 1),
+        ("p2", 5),
+    ];
+    let base = |first: i32| [first, first + 1, first + 2, first + 3];
+    let side = |first: i32, i: i32| {
+        let next = (i + 1) % 4;
+        [first + i, first + next, first + 4 + next, first + 4 + i]
+    };
+    // Three squares, and the four sides of each cube; the last ones turned inward.
+    let mut quads = [1, 5, 9].map(base).to_vec();
+    quads.extend((0..4).map(|i| side(1, i)));
+    quads.extend((0..4).map(|i| side(5, 3 - i)).map(|[a, b, c, d]| [d, c, b, a]));
+    let lists = [
+        ("eb_prop1", "num_el_blk", "", vec![7, 9]),
+        ("fbconn1", "quad_nodes", "nsided", quads.concat()),
+        ("fbepecnt1", "quads", "", vec![4; 11]),
+        ("facconn1", "cell_faces", "NFACED", vec![1, 2, 4, 5, 6, 7, 2, 3, 8, 9, 10, 11]),
+        ("ebepecnt1", "cells", "", vec![6, 6]),
+        ("connect2", "p2", "PYRAMID5", vec![9, 10, 11, 12, 13]),
+    ];
+    let mut variables = Vec::new();
+    for (name, dimension, kind, mut list) in lists {
+        change(name, &mut list);
+        let dimensions = if name == "connect2" { vec!["e2", dimension] } else { vec![dimension] };
+        variables.push(Variable { name: name.into(), dimensions, kind, values: Values::Integers(list) });
+    }
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let layer = |z: f64| square.map(|[x, y]| [x, y, z]);
+    let points = [&layer(0.0)[..], &layer(1.0), &layer(2.0), &[[0.5, 0.5, 5.0]]].concat();
+    for (axis, name) in ["coordx", "coordy", "coordz"].into_iter().enumerate() {
+        let values = Values::Floats(vec![points.iter().map(|point| point[axis]).collect()]);
+        variables.push(Variable { name: name.into(), dimensions: vec!["num_nodes"], kind: "", values });
+    }
+    netcdf(1, &dimensions, &variables, 0)
+}
+
+#[test]
+fn polyhedra_of_exodus_share_faces() {
+    let mesh = io::read_bytes_with("a.exo", &exodus_polyhedra(|_, _| ()), &everything(0)).unwrap();
+    assert_eq!((mesh.positions.len(), volume(&mesh)), (13, 3.0));
+    let found = tetralod::mesh::findings(&mesh, 0.0).unwrap();
+    assert_eq!((found.components, found.open_seam_faces), (1, 0));
+    let block = &field(&mesh.cell_fields, "block").values;
+    assert_eq!((block[0], block[block.len() - 1]), (7.0, 9.0));
+    for (variable, wrong) in [
+        ("fbconn1", 99),
+        ("fbepecnt1", 5),
+        ("fbepecnt1", -4),
+        ("facconn1", 12),
+        ("facconn1", 0),
+        ("ebepecnt1", 7),
+    ] {
+        let change = |name: &str, list: &mut Vec<i32>| {
+            if name == variable {
+                list[0] = wrong;
+            }
+        };
+        let error = io::read_bytes("a.exo", &exodus_polyhedra(change)).unwrap_err();
+        assert!(!matches!(error.reason, ReadReason::Io(_)), "{variable} {wrong}: {error}");
+    }
 }
 
 /// A file in classic netCDF: its header twice, as the first one does not know where the data begins.

@@ -16,6 +16,7 @@ mod meshers;
 mod odd;
 #[cfg(not(target_arch = "wasm32"))]
 mod pieces;
+mod polyhedra;
 mod real;
 mod surfaces;
 mod survey;

@@ -29,6 +29,8 @@ pub enum Edit<'a> {
     Volume(Option<(Medium, u32)>),
     /// The mesh of volume and tetrahedra, of which these ranges of points and of tetrahedra have changed.
     Mesh(MeshView<'a>, [&'a [Range<u32>]; 2]),
+    /// Where the points of that mesh go, times [`Look::moved`]; they stay if there are none.
+    Moves(&'a [[f64; 3]]),
     /// Surface number `key`.
     Surface {
         /// Which one.
@@ -69,6 +71,8 @@ pub struct Look {
     /// How dark places get that hardly any light reaches, 0 to 1; and how far away what hides the light may
     /// be, in model units.
     pub shade: [f32; 2],
+    /// How many times its move each thing is displaced. Planes cut what is not displaced yet.
+    pub moved: f64,
 }
 
 impl Default for Look {
@@ -79,6 +83,7 @@ impl Default for Look {
             pixel_ratio: 1.0,
             clips: Vec::new(),
             shade: [0.0, 1.0],
+            moved: 0.0,
         }
     }
 }
@@ -88,7 +93,8 @@ impl Look {
     pub(crate) fn relative_to(&self, single: &SinglePoints) -> Self {
         let clips = self.clips.iter().map(|clip| clip.relative_to(single)).collect();
         let [strength, radius] = self.shade;
-        Self { clips, shade: [strength, (f64::from(radius) / single.unit) as f32], ..self.clone() }
+        let shade = [strength, (f64::from(radius) / single.unit) as f32];
+        Self { clips, shade, moved: self.moved / single.unit, ..self.clone() }
     }
 }
 

@@ -1,4 +1,5 @@
-//! What is seen of tetrahedra: of solid ones the faces that no other one hides, of wires each edge once.
+//! What is seen of tetrahedra: of solid ones the faces that no other one hides, of wires each edge once, of points
+//! each once.
 
 use tetralod::mesh::NONE;
 use tetralod::view::{ClipPlane, MeshView};
@@ -39,6 +40,20 @@ pub(super) fn edges(mesh: &MeshView<'_>, cut: &ClipPlane) -> Vec<u32> {
     all.into_iter().flat_map(|(edge, t)| [(edge >> 32) as u32, edge as u32, t]).collect()
 }
 
+/// The points of kept tetrahedra: each once, with the first of the tetrahedra around it.
+pub(super) fn points(mesh: &MeshView<'_>, cut: &ClipPlane) -> Vec<u32> {
+    let mut first = vec![NONE; mesh.positions.len()];
+    let kept = kept(mesh, cut);
+    for ((t, tet), _) in (0..).zip(mesh.tets).zip(kept).filter(|(_, is_kept)| *is_kept) {
+        for v in tet {
+            let own = &mut first[*v as usize];
+            *own = t.min(*own);
+        }
+    }
+    let there = (0..).zip(first).filter(|(_, t)| *t != NONE);
+    there.flat_map(|(v, t)| [v, t]).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,6 +73,13 @@ mod tests {
         assert_eq!(outer_faces(&mesh(), &ClipPlane::NOTHING), [1, 2, 3, 9, 10, 11]);
         let cut = ClipPlane { normal: [1.0, 1.0, 1.0], offset: 1.0 };
         assert_eq!(outer_faces(&mesh(), &cut), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn points_are_those_of_kept_tetrahedra() {
+        assert_eq!(points(&mesh(), &ClipPlane::NOTHING), [0, 0, 1, 0, 2, 0, 3, 0, 4, 2]);
+        let cut = ClipPlane { normal: [1.0, 1.0, 1.0], offset: 1.0 };
+        assert_eq!(points(&mesh(), &cut), [0, 0, 1, 0, 2, 0, 3, 0]);
     }
 
     #[test]

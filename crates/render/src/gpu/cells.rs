@@ -2,7 +2,7 @@
 
 use crate::draw::{CellShape, CellStyle, Lighting};
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::cell_parts::{edges, outer_faces};
+use crate::gpu::cell_parts::{edges, outer_faces, points};
 use crate::gpu::mesh::MeshBuffers;
 use crate::gpu::pipeline::{Binding, Common, Output, Pipeline, Variant, group, group_layout, uniform};
 use crate::gpu::style::StyleUniform;
@@ -23,7 +23,7 @@ pub(super) struct CellPass {
     stored: (SinglePoints, SingleValues),
     own_stored: SingleValues,
     values: GrowBuffer<f32>,
-    /// The outer faces of solid tetrahedra, or the edges.
+    /// The outer faces of solid tetrahedra, or the edges, or the points.
     parts: GrowBuffer<u32>,
     /// Whether these are the ones of the mesh and the style.
     has_parts: bool,
@@ -32,7 +32,8 @@ pub(super) struct CellPass {
 impl CellPass {
     pub(super) fn new(context: &Context) -> Self {
         use Binding::{Uniform, Vertices};
-        let layout = group_layout(context, "cells", &[Uniform, Vertices, Vertices, Vertices, Vertices]);
+        let layout =
+            group_layout(context, "cells", &[Uniform, Vertices, Vertices, Vertices, Vertices, Vertices]);
         let pipeline = |vertex, fragment, only_front| {
             Pipeline::new("cells", [vertex, fragment], &[&layout], Output::Opaque { only_front })
         };
@@ -47,14 +48,14 @@ impl CellPass {
             stored: Default::default(),
             own_stored: SingleValues::PLAIN,
             values: GrowBuffer::new("values of tetrahedra", wgpu::BufferUsages::STORAGE),
-            parts: GrowBuffer::new("faces or edges of tetrahedra", wgpu::BufferUsages::STORAGE),
+            parts: GrowBuffer::new("faces, edges or points of tetrahedra", wgpu::BufferUsages::STORAGE),
             has_parts: false,
         }
     }
 
     pub(super) fn set_style(&mut self, context: &Context, style: &CellStyle) {
-        let is_wire = |style: &CellStyle| style.shape == CellShape::Wire;
-        self.has_parts &= style.cut == self.style.cut && is_wire(style) == is_wire(&self.style);
+        let kind = |style: &CellStyle| std::mem::discriminant(&style.shape);
+        self.has_parts &= style.cut == self.style.cut && kind(style) == kind(&self.style);
         self.style = *style;
         self.write_style(context);
     }
@@ -80,7 +81,7 @@ impl CellPass {
 
     /// Whether it lacks what the style shows of the mesh.
     pub(super) fn is_behind(&self) -> bool {
-        !self.has_parts && !matches!(self.style.shape, CellShape::Points(_))
+        !self.has_parts
     }
 
     /// Finds what the style shows of the mesh.
@@ -88,7 +89,7 @@ impl CellPass {
         let parts = match self.style.shape {
             CellShape::Wire => edges(mesh, &self.style.cut),
             CellShape::Solid(_) => outer_faces(mesh, &self.style.cut),
-            CellShape::Points(_) => Vec::new(),
+            CellShape::Points(_) => points(mesh, &self.style.cut),
         };
         self.has_parts = false;
         self.parts.write(context, &parts)?;
@@ -119,11 +120,13 @@ impl CellPass {
         }
         let values = self.values.binding().unwrap_or_else(|| points.clone());
         let parts = self.parts.binding().unwrap_or_else(|| points.clone());
-        let uniform = self.uniform.as_entire_binding();
-        pass.set_bind_group(1, &group(context, &self.layout, &[uniform, points, tets, values, parts]), &[]);
+        let has_moves = mesh.moves().is_some();
+        let moves = mesh.moves().unwrap_or_else(|| points.clone());
+        let resources = [self.uniform.as_entire_binding(), points, tets, values, parts, moves];
+        pass.set_bind_group(1, &group(context, &self.layout, &resources), &[]);
         let parts = if self.has_parts { self.parts.len() as u32 } else { 0 };
         // Shrunk ones and those that clip planes cut open show faces that others hide.
-        let mut variant = Variant::new(&self.style.style, has_clips);
+        let mut variant = Variant::new(&self.style.style, has_clips, has_moves);
         let is_whole = self.style.shape == CellShape::Solid(0.0) && !variant.has_clips;
         // Smooth light takes normals, which points do not have.
         if variant.light == Lighting::Smooth {
@@ -146,7 +149,7 @@ impl CellPass {
             }
             CellShape::Points(_) => {
                 set(&self.point);
-                pass.draw(0..6, 0..mesh.points.len() as u32);
+                pass.draw(0..6, 0..parts / 2);
             }
         }
     }

@@ -3,9 +3,9 @@
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::mesh::MeshBuffers;
-use crate::gpu::pipeline::{Binding, Common, Output, Pipeline, group, group_layout, uniform};
+use crate::gpu::pipeline::{Binding, Common, Output, Pipeline, Variant, group, group_layout, uniform};
 use crate::gpu::{Context, GpuError};
-use tetralod::geom::SingleValues;
+use tetralod::geom::{SinglePoints, SingleValues};
 use tetralod::mesh::NONE;
 use tetralod::view::{Medium, MeshView, Place};
 
@@ -19,6 +19,7 @@ struct Settings {
     table: [f32; 4],
     corners: [u32; 4],
     start: [u32; 4],
+    eye: [f32; 4],
 }
 
 /// No tetrahedron.
@@ -36,6 +37,8 @@ pub(super) struct Composite {
     /// The points of the tetrahedron that the eye is in; its number and the bits of the value at the eye.
     corners: [u32; 4],
     start: [u32; 3],
+    /// Where the eye is in that tetrahedron if it is not displaced, as it is stored.
+    eye: [f32; 3],
     /// The clip planes that apply to the volume.
     clips: u32,
     uniform: wgpu::Buffer,
@@ -46,8 +49,8 @@ pub(super) struct Composite {
 impl Composite {
     pub(super) fn new(context: &Context, lists: &wgpu::BindGroupLayout) -> Self {
         use Binding::{Both, Depths, Read, Uniform};
-        let entries_layout = group_layout(context, "entries of the volume", &[Both, Both]);
-        let bindings = [Read, Read, Read, Read, Read, Read, Uniform, Depths];
+        let entries_layout = group_layout(context, "entries of the volume", &[Both, Both, Both]);
+        let bindings = [Read, Read, Read, Read, Read, Read, Uniform, Depths, Read];
         let layout = group_layout(context, "composite", &bindings);
         let listed = Output::List { only_front: true };
         let over = Output::Over(wgpu::CompareFunction::Always);
@@ -66,6 +69,7 @@ impl Composite {
             table: [0.0; 4],
             corners: [0; 4],
             start: OUTSIDE,
+            eye: [0.0; 3],
             clips: u32::MAX,
             uniform: uniform::<Settings>(context, "settings of the composite"),
             nothing,
@@ -99,10 +103,15 @@ impl Composite {
     }
 
     /// Where in the mesh the eye is; none outside.
-    pub(super) fn set_eye(&mut self, mesh: &MeshView<'_>, stored: &SingleValues, place: Option<&Place>) {
-        (self.corners, self.start) = place.map_or(([0; 4], OUTSIDE), |place| {
-            let value = stored.store(place.value(mesh)).to_bits();
-            (mesh.tets[place.tet as usize], [place.tet, value, 0])
+    pub(super) fn set_eye(
+        &mut self,
+        mesh: &MeshView<'_>,
+        (points, values): (&SinglePoints, &SingleValues),
+        place: Option<&Place>,
+    ) {
+        (self.corners, self.start, self.eye) = place.map_or(([0; 4], OUTSIDE, [0.0; 3]), |place| {
+            let value = values.store(place.value(mesh)).to_bits();
+            (mesh.tets[place.tet as usize], [place.tet, value, 0], points.store(place.position(mesh)))
         });
     }
 
@@ -115,8 +124,11 @@ impl Composite {
     ) {
         let (Some(points), Some(faces)) = (mesh.points.binding(), mesh.faces.binding()) else { return };
         if self.has_volume() {
-            pass.set_pipeline(self.entries.get(context, common, None));
-            pass.set_bind_group(1, &group(context, &self.entries_layout, &[points, faces]), &[]);
+            let moves = mesh.moves();
+            let variant = moves.as_ref().map(|_| Variant::MOVES);
+            pass.set_pipeline(self.entries.get(context, common, variant));
+            let resources = [points.clone(), faces, moves.unwrap_or(points)];
+            pass.set_bind_group(1, &group(context, &self.entries_layout, &resources), &[]);
             pass.draw(0..3 * mesh.faces.len() as u32, 0..1);
         }
     }
@@ -132,11 +144,12 @@ impl Composite {
     ) {
         let parts = [mesh.points.binding(), mesh.faces.binding(), mesh.linked.buffer.binding()];
         let is_whole = self.has_volume() && parts.iter().all(Option::is_some);
-        let [id, value, _] = self.start;
+        let ([id, value, _], [x, y, z]) = (self.start, self.eye);
         let settings = Settings {
             table: if is_whole { self.table } else { [0.0; 4] },
             corners: self.corners,
             start: [id, value, self.clips, 0],
+            eye: [x, y, z, 0.0],
         };
         context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&settings));
         let or_nothing = |part: Option<_>| part.unwrap_or_else(|| self.nothing.as_entire_binding());
@@ -147,8 +160,10 @@ impl Composite {
             .map(or_nothing);
         let medium = or_nothing(self.medium.binding());
         let (uniform, depth) = (self.uniform.as_entire_binding(), wgpu::BindingResource::TextureView(depth));
-        let resources = [points, faces, tets, medium, heads, nodes, uniform, depth];
-        pass.set_pipeline(self.all.get(context, common, None));
+        let moves = mesh.moves().filter(|_| is_whole);
+        let variant = moves.as_ref().map(|_| Variant::MOVES);
+        let resources = [points, faces, tets, medium, heads, nodes, uniform, depth, or_nothing(moves)];
+        pass.set_pipeline(self.all.get(context, common, variant));
         pass.set_bind_group(1, &group(context, &self.layout, &resources), &[]);
         pass.draw(0..3, 0..1);
     }
@@ -160,6 +175,6 @@ mod tests {
 
     #[test]
     fn the_uniform_has_the_size_that_wgsl_gives_it() {
-        assert_eq!(size_of::<Settings>(), 3 * 16);
+        assert_eq!(size_of::<Settings>(), 4 * 16);
     }
 }

@@ -24,6 +24,7 @@ impl Renderer {
                 self.set_volume(medium.as_ref().map(|(medium, clips)| (medium, *clips)))?
             }
             Edit::Mesh(mesh, changes) => self.update_mesh(mesh, Some(*changes))?,
+            Edit::Moves(moves) => self.set_moves(moves)?,
             Edit::Surface { key, triangles, changes, style } => {
                 self.set_surface(*key, triangles, *changes)?;
                 self.set_style(*key, style);

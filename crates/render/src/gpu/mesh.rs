@@ -17,6 +17,8 @@ pub(super) struct MeshBuffers {
     pub(super) linked: Part<[u32; 5]>,
     pub(super) faces: GrowBuffer<[u32; 4]>,
     pub(super) corners: Part<[u32; 4]>,
+    /// Where the points go; none if they stay.
+    moves: GrowBuffer<[f32; 4]>,
 }
 
 /// A buffer that is there if it is needed.
@@ -59,6 +61,7 @@ impl MeshBuffers {
             linked: Part::new("tetrahedra with their neighbours"),
             faces: GrowBuffer::new("faces of the boundary", storage),
             corners: Part::new("tetrahedra"),
+            moves: GrowBuffer::new("moves of the mesh", storage),
         }
     }
 
@@ -96,6 +99,24 @@ impl MeshBuffers {
         updated.inspect_err(|_| self.forget())
     }
 
+    /// Where the points go of the mesh that came last; they stay if there are none.
+    pub(super) fn set_moves(&mut self, context: &Context, moves: &[[f64; 3]]) -> Result<(), GpuError> {
+        self.moves.clear();
+        if self.points.len() != moves.len() {
+            return Ok(());
+        }
+        let stored = |way: &[f64; 3]| {
+            let [x, y, z] = way.map(|x| x as f32);
+            [x, y, z, 0.0]
+        };
+        self.moves.write(context, &moves.iter().map(stored).collect::<Vec<_>>())
+    }
+
+    /// The moves, if all points have one.
+    pub(super) fn moves(&self) -> Option<wgpu::BindingResource<'_>> {
+        self.moves.binding().filter(|_| self.moves.len() == self.points.len())
+    }
+
     fn update_parts(
         &mut self,
         context: &Context,
@@ -126,6 +147,7 @@ impl MeshBuffers {
     /// Holds nothing any more.
     pub(super) fn forget(&mut self) {
         self.points.clear();
+        self.moves.clear();
         self.faces.clear();
         self.linked.buffer.clear();
         self.corners.buffer.clear();
@@ -134,7 +156,8 @@ impl MeshBuffers {
 
     /// Bytes of memory on the GPU.
     pub(super) fn bytes(&self) -> u64 {
-        self.points.bytes() + self.faces.bytes() + self.linked.buffer.bytes() + self.corners.buffer.bytes()
+        let tets = self.linked.buffer.bytes() + self.corners.buffer.bytes();
+        self.points.bytes() + self.moves.bytes() + self.faces.bytes() + tets
     }
 }
 

@@ -176,34 +176,49 @@ pub(super) struct Variant {
     pub has_values: bool,
     pub has_edges: bool,
     pub has_clips: bool,
+    /// Whether it may be displaced.
+    pub has_moves: bool,
 }
 
 impl Variant {
-    const COUNT: usize = 24;
+    const COUNT: usize = 48;
+
+    /// Of shaders that take no more of it: what may be displaced.
+    pub(super) const MOVES: Self = Self {
+        light: Lighting::None,
+        has_values: false,
+        has_edges: false,
+        has_clips: false,
+        has_moves: true,
+    };
 
     /// That of a style, in pictures with clip planes or without.
-    pub(super) fn new(style: &Style, has_clips: bool) -> Self {
+    pub(super) fn new(style: &Style, has_clips: bool, has_moves: bool) -> Self {
         Self {
             light: style.lighting,
             has_values: matches!(style.colouring, Colouring::Scale(_)),
             has_edges: style.edges.is_some_and(|edges| edges.width > 0.0),
             has_clips: has_clips && style.clips != 0,
+            has_moves,
         }
     }
 
     fn number(self) -> usize {
-        let flags = [self.has_values, self.has_edges, self.has_clips];
+        let flags = [self.has_values, self.has_edges, self.has_clips, self.has_moves];
         flags.iter().fold(self.light as usize, |number, flag| 2 * number + usize::from(*flag))
     }
 
-    fn constants(self) -> [(&'static str, f64); 4] {
-        let flag = |is_so: bool| f64::from(u8::from(is_so));
-        [
-            ("LIGHT", f64::from(self.light as u8)),
-            ("HAS_VALUES", flag(self.has_values)),
-            ("HAS_EDGES", flag(self.has_edges)),
-            ("HAS_CLIPS", flag(self.has_clips)),
-        ]
+    /// The constants that are not what shaders have without them: those that have no such constant take none.
+    fn constants(self) -> Vec<(&'static str, f64)> {
+        let flags = [
+            ("HAS_VALUES", self.has_values),
+            ("HAS_EDGES", self.has_edges),
+            ("HAS_CLIPS", self.has_clips),
+            ("HAS_MOVES", self.has_moves),
+        ];
+        let flags = flags.into_iter().filter(|(_, is_set)| *is_set).map(|(name, _)| (name, 1.0));
+        let light = (self.light != Lighting::None).then_some(("LIGHT", f64::from(self.light as u8)));
+        light.into_iter().chain(flags).collect()
     }
 }
 
@@ -269,7 +284,7 @@ impl Pipeline {
         });
         let constants = variant.map(Variant::constants);
         let compilation_options = wgpu::PipelineCompilationOptions {
-            constants: constants.as_ref().map_or(&[], |constants| constants),
+            constants: constants.as_deref().unwrap_or_default(),
             ..Default::default()
         };
         context.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {

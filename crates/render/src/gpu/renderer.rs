@@ -324,7 +324,7 @@ impl Renderer {
     /// # Errors
     /// If it is too large for the device; then none is drawn.
     pub fn update_mesh(&mut self, mesh: &MeshView<'_>, changes: Option<[&[Range<u32>]; 2]>) -> Result<()> {
-        self.composite.set_eye(mesh, &self.values, None);
+        self.composite.set_eye(mesh, (&self.points, &self.values), None);
         let is_same = changes.is_some_and(|[points, tets]| points.is_empty() && tets.is_empty());
         if let Some(cells) =
             self.cells.as_mut().filter(|cells| self.shows_cells && (cells.is_behind() || !is_same))
@@ -334,9 +334,18 @@ impl Renderer {
         self.mesh.update(&self.context, mesh, changes)
     }
 
+    /// Where the points of that mesh go, times [`Look::moved`], so many as it has; they stay if there are none. It comes after
+    /// [`Renderer::update_mesh`], each time.
+    ///
+    /// # Errors
+    /// If they are too many for the device.
+    pub fn set_moves(&mut self, moves: &[[f64; 3]]) -> Result<()> {
+        self.mesh.set_moves(&self.context, moves)
+    }
+
     /// Where the eye of the next pictures is in the mesh, as [`Probe::locate`](tetralod::view::Probe::locate) gives it; none outside.
     pub fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
-        self.composite.set_eye(mesh, &self.values, place);
+        self.composite.set_eye(mesh, (&self.points, &self.values), place);
     }
 
     /// Replaces the boxes.

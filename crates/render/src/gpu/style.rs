@@ -20,11 +20,15 @@ pub(super) struct StyleUniform {
 }
 
 impl StyleUniform {
-    /// The style of a surface with values that are stored like this.
-    pub(super) fn of_surface(style: &Style, values: &SingleValues) -> Self {
+    /// The style of a surface with values that are stored like this, and so many numbers a vertex in its moves.
+    pub(super) fn of_surface(style: &Style, values: &SingleValues, moves: u32) -> Self {
+        let bands = match &style.colouring {
+            Colouring::Scale(scale) if scale.bands > 1 => f32::from(scale.bands),
+            _ => 0.0,
+        };
         let (sides, scale, palette) = match &style.colouring {
             Colouring::Sides(sides) => (*sides, [0.0; 4], [[0; 4]; 256]),
-            Colouring::Scale(scale) => ([[0.0; 3]; 2], terms(scale, values), scale.table()),
+            Colouring::Scale(scale) => ([[0.0; 3]; 2], terms(scale, values), smooth(scale).table()),
         };
         let [front, back] = sides.map(|side| side.map(linear));
         let edges = style.edges.unwrap_or(EdgeLook { colour: [0.0; 4], width: 0.0 });
@@ -33,8 +37,8 @@ impl StyleUniform {
             back: [back[0], back[1], back[2], 0.0],
             scale,
             edge: edges.colour,
-            shape: [edges.width, 0.0, 0.0, 0.0],
-            clips: [style.clips, 0, 0, 0],
+            shape: [edges.width, bands, 0.0, 0.0],
+            clips: [style.clips, 0, moves, 0],
             cut: [0.0, 0.0, 0.0, f32::INFINITY],
             palette,
         }
@@ -42,7 +46,7 @@ impl StyleUniform {
 
     /// The style of tetrahedra with points and values that are stored like this.
     pub(super) fn of_cells(cells: &CellStyle, points: &SinglePoints, values: &SingleValues) -> Self {
-        let mut uniform = Self::of_surface(&cells.style, values);
+        let mut uniform = Self::of_surface(&cells.style, values, 0);
         match cells.shape {
             CellShape::Solid(shrunk) => uniform.shape[2] = shrunk.clamp(0.0, 0.95),
             CellShape::Points(diameter) => uniform.shape[3] = diameter,
@@ -54,6 +58,11 @@ impl StyleUniform {
         uniform.clips[1] = u32::from(cells.own_values);
         uniform
     }
+}
+
+/// A scale without bands: the shader makes them.
+fn smooth(scale: &ColourScale) -> ColourScale {
+    ColourScale { bands: 0, ..*scale }
 }
 
 /// The light that a channel of sRGB means.
@@ -93,7 +102,8 @@ mod tests {
 
     #[test]
     fn scales_become_terms() {
-        let scale = ColourScale { map: VIRIDIS, range: [3.0, 3.0], is_reversed: false, is_log: false };
+        let scale =
+            ColourScale { map: VIRIDIS, range: [3.0, 3.0], is_reversed: false, is_log: false, bands: 0 };
         assert_eq!(terms(&scale, &SingleValues::PLAIN), [3.0, 0.0, 0.0, 0.0]);
         let scale = ColourScale { range: [1.0, 100.0], is_log: true, ..scale };
         let [low, slope, is_log, _] = terms(&scale, &SingleValues::PLAIN);
@@ -111,7 +121,7 @@ mod tests {
         ];
         for (values, range) in stores {
             for is_log in [false, true] {
-                let scale = ColourScale { map: VIRIDIS, range, is_reversed: false, is_log };
+                let scale = ColourScale { map: VIRIDIS, range, is_reversed: false, is_log, bands: 0 };
                 let [low, slope, log, part] = terms(&scale, &values).map(f64::from);
                 for t in [0.0, 0.1, 0.5, 1.0] {
                     let value = range[0] + t * (range[1] - range[0]);

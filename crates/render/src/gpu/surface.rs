@@ -23,6 +23,9 @@ pub(super) struct Surface {
     normals: GrowBuffer<[f32; 3]>,
     values: GrowBuffer<f32>,
     indices: GrowBuffer<[u32; 3]>,
+    /// Where vertices go, and with slopes how that changes around them: so many numbers a vertex, none if they stay.
+    moves: GrowBuffer<f32>,
+    moves_each: u32,
     style: Style,
     /// How the values are stored.
     stored: SingleValues,
@@ -33,7 +36,8 @@ pub(super) struct Surface {
 impl SurfacePipelines {
     pub(super) fn new(context: &Context, lists: &wgpu::BindGroupLayout) -> Self {
         use Binding::{Uniform, Vertices};
-        let layout = group_layout(context, "surface", &[Uniform, Vertices, Vertices, Vertices, Vertices]);
+        let layout =
+            group_layout(context, "surface", &[Uniform, Vertices, Vertices, Vertices, Vertices, Vertices]);
         let (opaque, listed) = (Output::Opaque { only_front: false }, Output::List { only_front: false });
         let opaque = Pipeline::new("surface", ["vs", "fs"], &[&layout], opaque);
         let listed = Pipeline::new("surface", ["vs", "fs_list"], &[&layout, lists], listed);
@@ -52,7 +56,7 @@ impl SurfacePipelines {
         let pipeline = if are_listed { &self.listed } else { &self.opaque };
         for surface in surfaces.filter(|surface| surface.is_listed() == are_listed) {
             if let Some(group) = &surface.group {
-                let variant = Variant::new(&surface.style, has_clips);
+                let variant = Variant::new(&surface.style, has_clips, surface.moves_each > 0);
                 pass.set_pipeline(pipeline.get(context, common, Some(variant)));
                 pass.set_bind_group(1, group, &[]);
                 pass.draw(0..surface.indices.len() as u32 * 3, 0..1);
@@ -69,6 +73,8 @@ impl Surface {
             normals: GrowBuffer::new("normals of a surface", storage),
             values: GrowBuffer::new("values of a surface", storage),
             indices: GrowBuffer::new("triangles of a surface", storage),
+            moves: GrowBuffer::new("moves of a surface", storage),
+            moves_each: 0,
             style: Style::default(),
             stored: SingleValues::PLAIN,
             uniform: uniform::<StyleUniform>(context, "style"),
@@ -87,12 +93,13 @@ impl Surface {
 
     /// Bytes of memory on the GPU.
     pub(super) fn bytes(&self) -> u64 {
-        self.positions.bytes() + self.normals.bytes() + self.values.bytes() + self.indices.bytes()
+        let vertices = self.positions.bytes() + self.normals.bytes() + self.values.bytes();
+        vertices + self.indices.bytes() + self.moves.bytes()
     }
 
     pub(super) fn set_style(&mut self, context: &Context, style: &Style) {
         self.style = *style;
-        let uniform = StyleUniform::of_surface(style, &self.stored);
+        let uniform = StyleUniform::of_surface(style, &self.stored, self.moves_each);
         context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
     }
 
@@ -106,8 +113,13 @@ impl Surface {
         points: &SinglePoints,
     ) -> Result<(), GpuError> {
         self.group = None;
-        let is_stored_alike = self.stored == triangles.single;
-        self.stored = triangles.single;
+        let moves_each = match (triangles.moves.is_empty(), triangles.slopes.is_empty()) {
+            (true, _) => 0,
+            (false, true) => 3,
+            (false, false) => 12,
+        };
+        let is_stored_alike = (self.stored, self.moves_each) == (triangles.single, moves_each);
+        (self.stored, self.moves_each) = (triangles.single, moves_each);
         if !is_stored_alike {
             self.set_style(context, &self.style.clone());
         }
@@ -133,10 +145,13 @@ impl Surface {
             let packed: Vec<_> = triangles.indices.iter().zip(triangles.inner_sides).map(packed).collect();
             self.indices.update(context, &packed, changed)?;
         }
+        // Changes of a surface say nothing of its moves: they come whole.
+        self.moves.write(context, &stored_moves(triangles, points))?;
         let resources =
             [self.positions.binding(), self.normals.binding(), self.values.binding(), self.indices.binding()];
         let [Some(positions), Some(normals), Some(values), Some(indices)] = resources else { return Ok(()) };
-        let resources = [self.uniform.as_entire_binding(), positions, normals, values, indices];
+        let moves = self.moves.binding().unwrap_or_else(|| positions.clone());
+        let resources = [self.uniform.as_entire_binding(), positions, normals, values, indices, moves];
         self.group = Some(group(context, &pipelines.layout, &resources));
         Ok(())
     }
@@ -146,7 +161,22 @@ impl Surface {
         self.normals.clear();
         self.values.clear();
         self.indices.clear();
+        self.moves.clear();
     }
+}
+
+/// The moves of all vertices, with their slopes if they have some: these are of points as they are stored.
+fn stored_moves(triangles: &Triangles<'_>, points: &SinglePoints) -> Vec<f32> {
+    let Triangles { moves, slopes, .. } = triangles;
+    if slopes.is_empty() {
+        return moves.iter().flatten().map(|x| *x as f32).collect();
+    }
+    let mut stored = Vec::with_capacity(12 * moves.len());
+    for (way, slope) in moves.iter().zip(*slopes) {
+        stored.extend(way.map(|x| x as f32));
+        stored.extend(slope.iter().flatten().map(|x| (x * points.unit) as f32));
+    }
+    stored
 }
 
 /// A binding is never empty.

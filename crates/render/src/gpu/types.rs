@@ -21,6 +21,7 @@ pub(super) struct Frame {
     depth: [f32; 4],
     sky: [f32; 4],
     ground: [f32; 4],
+    moved: [f32; 4],
     clips: [[f32; 4]; MOST_CLIPS],
 }
 
@@ -59,6 +60,7 @@ impl Frame {
             depth: depth_terms(&matrix, rays.origin[0], camera.forward()),
             sky: look.sky,
             ground: look.ground,
+            moved: [look.moved as f32, 0.0, 0.0, 0.0],
             clips,
         }
     }
@@ -105,10 +107,10 @@ mod tests {
 
     #[test]
     fn twins_have_the_sizes_and_places_that_wgsl_gives_them() {
-        assert_eq!(size_of::<Frame>(), 64 + 14 * 16 + MOST_CLIPS * 16);
+        assert_eq!(size_of::<Frame>(), 64 + 15 * 16 + MOST_CLIPS * 16);
         assert_eq!(offset_of!(Frame, eye), 160);
         assert_eq!(offset_of!(Frame, viewport), 224);
-        assert_eq!(offset_of!(Frame, clips), 288);
+        assert_eq!(offset_of!(Frame, clips), 304);
         assert_eq!(size_of::<Line>(), 44);
         let places = Line::ATTRIBUTES.map(|a| a.offset as usize);
         let fields =

@@ -6,8 +6,8 @@ use super::styles::{quantity, scale};
 use super::{SceneError, SceneState};
 use std::borrow::Cow;
 use tetralod::geom::{Bounds, SingleValues};
-use tetralod::mt::{MeshChanges, MtInfo};
-use tetralod::session::Session;
+use tetralod::mt::{MeshChanges, MtInfo, Regions};
+use tetralod::session::{Session, TetQuantity};
 use tetralod::view::{ColourScale, Difference, MeshView};
 
 /// What was computed last of a session's mesh before any object.
@@ -26,7 +26,7 @@ impl Current {
         self.changes = session.take_changes();
         let is_new = is_stale || !self.changes.vertices.is_empty() || !self.changes.tets.is_empty();
         if let (true, Some(quantity)) = (is_new, state.cells.as_ref().map_or(Ok(None), quantity)?) {
-            session.tet_quantity_into(quantity, &mut self.tet_values)?;
+            quantity_into(session, quantity, &mut self.tet_values)?;
         }
         Ok(is_new)
     }
@@ -57,6 +57,8 @@ impl Current {
             largest_difference: difference.map(|difference| difference.largest),
             fields: Box::new(move |field| session.values(field).into()),
             tet_values: &self.tet_values,
+            regions: session.mesh().map_or(&[][..], |mesh| mesh.regions()),
+            colors: session.regions().map_or_else(Vec::new, Regions::colors),
             info,
             shown: session.field(),
             isovalue: session.first_isovalue(session.field()),
@@ -65,6 +67,29 @@ impl Current {
             changes: &self.changes,
         }
     }
+}
+
+/// A number for each tetrahedron; for regions the values of their colours on [`region_scale`](tetralod::view::region_scale).
+pub(super) fn quantity_into(
+    session: &mut Session,
+    quantity: TetQuantity,
+    values: &mut Vec<f64>,
+) -> Result<()> {
+    session.tet_quantity_into(quantity, values)?;
+    if let (TetQuantity::Region, Some(colors)) = (quantity, session.regions().map(Regions::colors)) {
+        values.iter_mut().for_each(|value| *value = f64::from(colors[*value as usize]) + 0.5);
+    }
+    Ok(())
+}
+
+/// The number of the field with a name, of the time step that is shown if it has that; that of the mesh without one. `what` asks for it.
+pub(super) fn field_number(info: &MtInfo, shown: usize, what: &str, name: Option<&String>) -> Result<usize> {
+    let Some(name) = name else { return Ok(shown) };
+    info.step_of(name, shown).ok_or_else(|| {
+        let names = info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>();
+        let problem = format!("there is no field {name:?}; this volume has: {}", names.join(", "));
+        SceneError::state(what, problem)
+    })
 }
 
 /// What the objects are computed from.
@@ -79,6 +104,9 @@ pub(super) struct Input<'a> {
     pub fields: Box<dyn Fn(usize) -> Cow<'a, [f64]> + 'a>,
     /// A number for each tetrahedron, if they are coloured by one.
     pub tet_values: &'a [f64],
+    /// The region of each tetrahedron, and the colour of each region; nothing without regions.
+    pub regions: &'a [u16],
+    pub colors: Vec<u8>,
     pub info: &'a MtInfo,
     /// The number of the field.
     pub shown: usize,
@@ -90,17 +118,15 @@ pub(super) struct Input<'a> {
 }
 
 impl<'a> Input<'a> {
-    /// The number of the field with a name, of the time step that is shown if it has that; that of the mesh without one.
+    /// The quantity that colours tetrahedra; none for the field, which it is, too, where regions are asked for and there are none.
+    pub fn quantity(&self) -> Result<Option<TetQuantity>> {
+        let found = self.state.cells.as_ref().map_or(Ok(None), quantity)?;
+        Ok(found.filter(|found| *found != TetQuantity::Region || !self.colors.is_empty()))
+    }
+
+    /// As [`field_number`].
     pub fn field(&self, what: &str, name: Option<&String>) -> Result<usize> {
-        let Some(name) = name else { return Ok(self.shown) };
-        let time = self.info.fields[self.shown].time;
-        let all = || self.info.fields.iter().enumerate().filter(|(_, field)| field.name == *name);
-        let found = all().find(|(_, field)| field.time == time).or_else(|| all().next());
-        found.map(|(number, _)| number).ok_or_else(|| {
-            let names = self.info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>();
-            let problem = format!("there is no field {name:?}; this volume has: {}", names.join(", "));
-            SceneError::state(what, problem)
-        })
+        field_number(self.info, self.shown, what, name)
     }
 
     /// The colours of a field; the range of the state is for the field that is shown.

@@ -1,12 +1,12 @@
 //! A mesh that was kept, to be shown beside later ones.
 
-use super::input::Input;
+use super::input::{Input, quantity_into};
 use super::objects::Objects;
 use super::styles::quantity;
 use super::{SceneError, SceneState};
 use crate::draw::Edit;
 use tetralod::geom::Bounds;
-use tetralod::mt::{MeshChanges, MtInfo};
+use tetralod::mt::{MeshChanges, MtInfo, Regions};
 use tetralod::session::{Session, SessionError, TetQuantity};
 use tetralod::view::MeshView;
 
@@ -24,6 +24,9 @@ pub(super) struct KeptMesh {
     tets: Vec<[u32; 4]>,
     neighbors: Vec<[u32; 4]>,
     fields: Vec<Vec<f64>>,
+    /// The region of each tetrahedron, and the colour of each region.
+    regions: Vec<u16>,
+    colors: Vec<u8>,
     /// The values of each of [`TetQuantity::ALL`].
     quantities: Vec<Vec<f64>>,
     /// All points: another field may be shown than before.
@@ -33,13 +36,17 @@ pub(super) struct KeptMesh {
 impl KeptMesh {
     pub fn of(session: &mut Session) -> Result<Self, SceneError> {
         let count = session.info().ok_or(SessionError::NotReady)?.fields.len();
-        let quantities =
-            TetQuantity::ALL.into_iter().map(|one| session.tet_quantity(one)).collect::<Result<_, _>>()?;
+        let mut quantities = vec![Vec::new(); TetQuantity::ALL.len()];
+        for (quantity, values) in TetQuantity::ALL.into_iter().zip(&mut quantities) {
+            quantity_into(session, quantity, values)?;
+        }
         let fields = (0..count).map(|field| session.values(field)).collect();
+        let regions = session.mesh().map_or_else(Vec::new, |mesh| mesh.regions().to_vec());
+        let colors = session.regions().map_or_else(Vec::new, Regions::colors);
         let MeshView { positions, tets, neighbors, .. } = session.view();
         let (positions, tets, neighbors) = (positions.to_vec(), tets.to_vec(), neighbors.to_vec());
         let changes = MeshChanges::of_all_vertices(positions.len());
-        Ok(Self { positions, tets, neighbors, fields, quantities, changes })
+        Ok(Self { positions, tets, neighbors, fields, regions, colors, quantities, changes })
     }
 
     /// The mesh with one of its fields.
@@ -73,6 +80,8 @@ impl Kept {
             largest_difference: None,
             fields: Box::new(move |field| kept.values(field).into()),
             tet_values: place.and_then(|i| kept.quantities.get(i)).map_or(&[], Vec::as_slice),
+            regions: &kept.regions,
+            colors: kept.colors.clone(),
             info,
             shown,
             isovalue,

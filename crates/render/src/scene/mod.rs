@@ -8,6 +8,7 @@ mod error;
 mod input;
 mod kept;
 mod legend;
+mod moves;
 mod objects;
 mod pick;
 mod state;
@@ -15,21 +16,25 @@ mod styles;
 
 pub use error::SceneError;
 pub use legend::Legend;
+#[doc(hidden)]
+pub use state::RegionName;
 pub use state::{
-    ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourState, CompareState,
-    IsosurfaceState, MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
+    ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourBy, ColourState, CompareState,
+    DeformState, IsosurfaceState, MapName, PlaneState, SceneState, SliceState, StreamlineState,
+    ThresholdState, VolumeState,
 };
 
 use crate::draw::{BoxLines, Edit, Look, MOST_CLIPS};
 use glam::DVec3;
 use input::Current;
 use kept::{Kept, KeptMesh};
+use moves::deformation;
 use objects::Objects;
 use styles::clips;
 use styles::{quantity, scale};
 use tetralod::geom::{Bounds, Camera, Ray};
-use tetralod::mt::MtInfo;
-use tetralod::session::Session;
+use tetralod::mt::numbers_of;
+use tetralod::session::{Deformation, Session};
 use tetralod::view::{MeshView, Place, Probe};
 
 /// The outline of the domain, on a dark and on a light background.
@@ -46,8 +51,12 @@ pub struct Scene {
     /// The box around the reference mesh, once it is known.
     bounds: Option<Bounds>,
     look: Look,
+    /// How the volume is displaced, as of the last update.
+    deformation: Option<Deformation>,
     /// Whether the state has changed since the last update.
     is_stale: bool,
+    /// Whether nothing of it has changed but how far things are displaced.
+    is_moved: bool,
 }
 
 /// What [`Scene::update`] has found.
@@ -71,7 +80,9 @@ impl Default for Scene {
             kept: None,
             bounds: None,
             look: Look::default(),
+            deformation: None,
             is_stale: true,
+            is_moved: false,
         }
     }
 }
@@ -116,8 +127,13 @@ impl Scene {
     /// If a part of it makes no sense whatever the volume is; then nothing changes.
     pub fn set_state(&mut self, state: SceneState) -> Result<(), SceneError> {
         check(&state)?;
-        self.state = state;
-        self.is_stale = true;
+        let before = std::mem::replace(&mut self.state, state);
+        // How far things are displaced is up to the renderer alone: nothing is computed again.
+        if before != self.state && at_rest(&before) == at_rest(&self.state) {
+            self.is_moved = true;
+        } else {
+            self.is_stale = true;
+        }
         Ok(())
     }
 
@@ -160,6 +176,24 @@ impl Scene {
         true
     }
 
+    /// The regions of the session's volume that the state shows, as a request takes them; none if all are, or the base mesh is not there.
+    ///
+    /// # Errors
+    /// If there is no such region.
+    pub fn shown_regions(&self, session: &Session) -> Result<Option<Vec<u16>>, SceneError> {
+        let (Some(names), Some(_)) = (&self.state.regions, session.info()) else { return Ok(None) };
+        let names: Vec<String> = names.iter().map(RegionName::to_string).collect();
+        let error = |(place, problem)| SceneError::state(format!("regions[{place}]"), problem);
+        numbers_of(session.regions(), &names).map(Some).map_err(error)
+    }
+
+    /// The field of the threshold, by its number, and its range.
+    fn within(&self, session: &Session) -> Result<Option<(usize, [f64; 2])>, SceneError> {
+        let (Some(threshold), Some(info)) = (&self.state.threshold, session.info()) else { return Ok(None) };
+        let field = input::field_number(info, session.field(), "threshold.field", threshold.field.as_ref())?;
+        Ok(Some((field, threshold.range)))
+    }
+
     /// Brings what is shown up to date with the session's mesh, and lists what is to be drawn otherwise than before.
     pub fn update<'a>(&'a mut self, session: &'a mut Session) -> Update<'a> {
         let mut edits = Vec::new();
@@ -173,19 +207,30 @@ impl Scene {
         edits: &mut Vec<Edit<'a>>,
     ) -> Result<bool, SceneError> {
         self.meet(session);
-        let is_stale = std::mem::take(&mut self.is_stale);
-        let Some(points) = session.info().map(MtInfo::single_points) else { return Ok(is_stale) };
+        let (is_stale, is_moved) = (std::mem::take(&mut self.is_stale), std::mem::take(&mut self.is_moved));
+        if session.info().is_none() {
+            return Ok(is_stale);
+        }
+        let shown = self.shown_regions(session)?;
+        session.show_regions(shown.as_deref());
+        session.show_within(self.within(session)?);
+        let Some(info) = session.info() else { return Ok(is_stale) };
+        let points = info.single_points();
         let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
         let Self { state, current, objects, kept, look, .. } = self;
         let state = &*state;
+        // Where there is no such vector, the objects say so.
+        self.deformation = deformation(state, info, session.field(), &bounds).ok().flatten();
+        look.moved = self.deformation.map_or(0.0, |deformation| deformation.reach());
         // Before anything is stored.
         let first = || [Edit::Points(points), Edit::Boxes(boxes(state, &bounds))];
         if is_stale {
             edits.extend(first());
-            *look = Look { pixel_ratio: look.pixel_ratio, ..self::look(state, &bounds) };
+            let Look { pixel_ratio, moved, .. } = *look;
+            *look = Look { pixel_ratio, moved, ..self::look(state, &bounds) };
         }
         if !current.take(session, state, is_stale)? {
-            return Ok(false);
+            return Ok(is_moved);
         }
         let session = &*session;
         let (Some(info), field) = (session.info(), session.field()) else { return Ok(is_stale) };
@@ -208,9 +253,32 @@ impl Scene {
     }
 
     /// The nearest point that is shown along a ray: of an isosurface, a slice, the boundary, a tetrahedron, a streamline, an
-    /// arrow, or of the volume where half of the light is lost; none if there is none.
+    /// arrow, or of the volume where half of the light is lost; none if there is none. It is a point of the model as it is, also where that is
+    /// displaced.
     pub fn pick(&self, session: &mut Session, ray: &Ray) -> Option<[f64; 3]> {
-        self.objects.pick(session, &self.state, &self.look.clips, ray, self.bounds.as_ref()?)
+        self.objects.pick(session, &self.state, &self.look, ray, &self.shown_bounds(session)?)
+    }
+
+    /// Where a point of the model is shown: at another place if it is displaced. None outside of the session's mesh.
+    pub fn shown(&self, session: &mut Session, point: [f64; 3]) -> Option<[f64; 3]> {
+        let mesh = session.view();
+        let Some(moved) = self.objects.moved_points(&mesh, self.look.moved) else { return Some(point) };
+        let place = Probe::new(mesh).locate(point)?;
+        Some(place.position(&MeshView { positions: &moved, ..mesh }))
+    }
+
+    /// The box that all is shown in: [`Scene::bounds`], or with what is displaced, at all phases. By the ranges of the vector's components,
+    /// so it is the same for all meshes.
+    pub fn shown_bounds(&self, session: &Session) -> Option<Bounds> {
+        let (bounds, info) = (self.bounds?, session.info()?);
+        let deformation = deformation(&self.state, info, session.field(), &bounds).ok().flatten();
+        let swings = self.state.deform.as_ref().is_some_and(|deform| deform.phase.is_some());
+        Some(deformation.map_or(bounds, |deformation| deformation.bounds(info, swings, &bounds)))
+    }
+
+    /// How things are displaced, as of the last update; none if they are not.
+    pub fn deformation(&self) -> Option<&Deformation> {
+        self.deformation.as_ref()
     }
 
     /// Where in the session's mesh the eye is, if a volume is shown: that mesh, and the place unless it is outside.
@@ -219,11 +287,16 @@ impl Scene {
         session: &'a mut Session,
         camera: &Camera,
     ) -> Option<(MeshView<'a>, Option<Place>)> {
-        let (Some(_), Some(bounds)) = (&self.state.volume, &self.bounds) else { return None };
+        let (Some(_), Some(bounds)) = (&self.state.volume, self.shown_bounds(session)) else { return None };
         let eye = camera.rays(1.0).origin[0];
         let mesh = session.view();
         let is_near = eye.cmpge(DVec3::from(bounds.min)).all() && eye.cmple(DVec3::from(bounds.max)).all();
-        Some((mesh, is_near.then(|| Probe::new(mesh).locate(eye.into())).flatten()))
+        let place = is_near.then(|| {
+            let moved = self.objects.moved_points(&mesh, self.look.moved);
+            let positions = moved.as_deref().unwrap_or(mesh.positions);
+            Probe::new(MeshView { positions, ..mesh }).locate(eye.into())
+        });
+        Some((mesh, place.flatten()))
     }
 }
 
@@ -255,17 +328,29 @@ fn check(state: &SceneState) -> Result<(), SceneError> {
             format!("at most {MOST_CLIPS} planes can cut, of which a box takes six; given: {planes}");
         return Err(SceneError::state("clips", problem));
     }
+    let ascends = |[low, high]: [f64; 2]| low <= high;
+    if state.threshold.as_ref().is_some_and(|threshold| !ascends(threshold.range)) {
+        return Err(SceneError::state("threshold.range", "must be two numbers that ascend, [low, high]"));
+    }
     if state.isosurfaces.iter().any(|surface| surface.value.is_some_and(|value| !value.is_finite())) {
         return Err(SceneError::state("isosurfaces", "values must be finite numbers"));
     }
     if let Some(cells) = &state.cells {
         quantity(cells)?;
     }
+    if state.colours.bands.is_some_and(|bands| !(2..=64).contains(&bands)) {
+        return Err(SceneError::state("colours.bands", "must be a number of colours, 2 to 64"));
+    }
     if let Some(range) = state.colours.range {
         scale(&state.colours, Some(range), range)?;
     }
     check_numbers(state)?;
     check_volume(state)
+}
+
+/// A state that shows the same, displaced otherwise.
+fn at_rest(state: &SceneState) -> SceneState {
+    SceneState { deform: state.deform.as_ref().map(DeformState::at_rest), ..state.clone() }
 }
 
 /// Numbers that are to be drawn with: finite, and lengths positive.
@@ -290,7 +375,14 @@ fn check_numbers(state: &SceneState) -> Result<(), SceneError> {
     let opacities = state.isosurfaces.iter().map(|surface| ("isosurfaces", surface.opacity));
     let opacities = opacities.chain(state.slices.iter().map(|slice| ("slices", slice.opacity)));
     let opacities = opacities.chain(state.boundary.as_ref().map(|boundary| ("boundary", boundary.opacity)));
-    let mut numbers = opacities.chain(cells.into_iter().flatten()).chain([("shade", state.shade)]);
+    let deform = state.deform.as_ref();
+    let deform = [
+        ("deform.factor", deform.and_then(|deform| deform.factor)),
+        ("deform.phase", deform.and_then(|deform| deform.phase)),
+    ];
+    let deform = deform.into_iter().filter_map(|(what, number)| Some((what, number?)));
+    let numbers = opacities.chain(cells.into_iter().flatten()).chain(deform);
+    let mut numbers = numbers.chain([("shade", state.shade)]);
     match numbers.find(|(_, number)| !number.is_finite()) {
         Some((what, number)) => {
             Err(SceneError::state(what, format!("must be a finite number, not {number}")))

@@ -2,15 +2,18 @@
 
 use super::error::Result;
 use super::input::Input;
-use super::state::{ArrowState, IsosurfaceState, StreamlineState};
-use super::styles::{cell_style, clips, isosurface_style, medium, other_clips, quantity, range, scale};
+use super::moves::Moves;
+use super::state::{ArrowState, Colour, ColourBy, IsosurfaceState, StreamlineState};
+use super::styles::{cell_style, clips, isosurface_style, medium, other_clips, range, scale};
 use super::{Legend, SliceState};
 use crate::draw::{Colouring, EdgeLook, Edit, Lighting, Style};
 use tetralod::geom::SingleValues;
+use tetralod::mesh::REGION_COLORS;
 use tetralod::mt::MeshChanges;
+use tetralod::session::TetQuantity;
 use tetralod::view::{
-    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, IsoSurface, MeshView, Slice, Solids,
-    SurfaceChanges, TraceOptions, Tracer, Triangles, TubeOptions,
+    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, IsoSurface, MeshView, Slice, Slope, Solids,
+    SurfaceChanges, TraceOptions, Tracer, Triangles, TubeOptions, region_color, region_scale,
 };
 
 /// Numbers of surfaces: those of lists begin at these.
@@ -20,6 +23,13 @@ const CAPS: u32 = 2 << 16;
 const BOUNDARY: u32 = 3 << 16;
 const TUBES: u32 = BOUNDARY + 1;
 const ARROWS: u32 = BOUNDARY + 2;
+const UNDEFORMED: u32 = BOUNDARY + 3;
+/// The boundary in the colours of regions: one for each colour.
+const REGIONS: u32 = 4 << 16;
+
+/// What the model without displacement looks like.
+const GHOST: [f32; 3] = [0.62, 0.68, 0.76];
+const GHOST_OPACITY: f32 = 0.25;
 
 type Edits<'a> = Vec<Edit<'a>>;
 
@@ -27,20 +37,36 @@ type Edits<'a> = Vec<Edit<'a>>;
 #[derive(Debug, Default)]
 pub(super) struct Objects {
     pub(super) isosurfaces: Vec<Isosurface>,
-    slices: Vec<Section>,
+    pub(super) slices: Vec<Section>,
     /// What closes the boundary where planes cut it open.
-    caps: Vec<Section>,
-    pub(super) boundary: BoundarySurface,
-    pub(super) tubes: Solids,
-    pub(super) arrows: Solids,
+    pub(super) caps: Vec<Section>,
+    pub(super) boundary: Displaced<BoundarySurface>,
+    /// The boundary by colour, if regions give it its colours.
+    by_color: Vec<Displaced<BoundarySurface>>,
+    /// The boundary as it is without displacement.
+    undeformed: BoundarySurface,
+    pub(super) tubes: Displaced<Solids>,
+    pub(super) arrows: Displaced<Solids>,
+    /// Where the points of the mesh go.
+    pub(super) moves: Vec<[f64; 3]>,
     legend: Option<Legend>,
     /// How the values of the mesh are stored where it is drawn.
     single: SingleValues,
 }
 
+/// A surface, and where its vertices go if the scene is displaced.
+#[derive(Debug, Default)]
+pub(super) struct Displaced<S> {
+    pub(super) surface: S,
+    pub(super) moves: Vec<[f64; 3]>,
+}
+
 #[derive(Debug, Default)]
 pub(super) struct Isosurface {
     pub(super) surface: IsoSurface,
+    /// Where its vertices go if the scene is displaced, and how that changes around them.
+    pub(super) moves: Vec<[f64; 3]>,
+    pub(super) slopes: Vec<Slope>,
     /// What the last update has changed.
     changes: SurfaceChanges,
     /// The values of the field that colours it, if one does.
@@ -50,8 +76,10 @@ pub(super) struct Isosurface {
 }
 
 #[derive(Debug, Default)]
-struct Section {
-    slice: Slice,
+pub(super) struct Section {
+    pub(super) slice: Slice,
+    /// Where its vertices go if the scene is displaced.
+    pub(super) moves: Vec<[f64; 3]>,
     /// The values of another field than the one that is shown, if that colours it.
     values: Vec<f64>,
     inner_sides: Vec<u8>,
@@ -74,7 +102,21 @@ impl Objects {
         is_stale: bool,
         edits: &mut Edits<'a>,
     ) -> Result<()> {
-        let Self { isosurfaces, slices, caps, boundary, tubes, arrows, legend, single } = self;
+        let Self {
+            isosurfaces,
+            slices,
+            caps,
+            boundary,
+            by_color,
+            undeformed,
+            tubes,
+            arrows,
+            moves,
+            legend,
+            single,
+        } = self;
+        let by = &Moves::of(input)?;
+        *moves = by.as_ref().map_or_else(Vec::new, Moves::at_points);
         let stored = input.single(input.shown);
         let is_stored_anew = std::mem::replace(single, stored) != stored;
         edits.push(Edit::Values(stored));
@@ -85,12 +127,18 @@ impl Objects {
         }
         let MeshChanges { vertices, tets } = input.changes;
         edits.push(Edit::Mesh(input.mesh, [vertices, tets]));
-        list_isosurfaces(isosurfaces, input, edits)?;
-        list_sections(slices, SLICES, input, &input.state.slices, edits)?;
-        list_boundary(boundary, caps, input, edits)?;
+        edits.push(Edit::Moves(moves));
+        list_each(isosurfaces, ISOSURFACES, &input.state.isosurfaces, edits, |own, key, state| {
+            own.update(input, by, key, state)
+        })?;
+        list_each(slices, SLICES, &input.state.slices, edits, |own, key, state| {
+            own.update(input, by, key, state)
+        })?;
+        list_boundary((boundary, by_color), caps, input, by, edits)?;
+        list_undeformed(undeformed, input, edits);
         update_legend(legend, input)?;
-        edits.push(streamlines(tubes, input, legend)?);
-        edits.push(arrow_list(arrows, input, legend)?);
+        edits.push(streamlines(tubes, input, by, legend)?);
+        edits.push(arrow_list(arrows, input, by, legend)?);
         Ok(())
     }
 }
@@ -100,15 +148,18 @@ fn list_cells<'a>(input: &Input<'a>, legend: &mut Option<Legend>, edits: &mut Ed
         edits.push(Edit::Cells(None));
         return Ok(());
     };
-    let quantity = quantity(cells)?;
+    let quantity = input.quantity()?;
+    if quantity.is_some() {
+        edits.push(Edit::CellValues(input.tet_values));
+    }
     let scale = match quantity {
-        Some(_) => {
-            edits.push(Edit::CellValues(input.tet_values));
-            scale(&input.state.colours, None, range(input.tet_values))?
-        }
+        Some(TetQuantity::Region) => region_scale(),
+        Some(_) => scale(&input.state.colours, None, range(input.tet_values))?,
         None => input.scale(input.shown)?,
     };
-    *legend = quantity.map(|quantity| Legend { label: quantity.name().to_owned(), scale });
+    // Colours of regions mean no values.
+    let named = quantity.filter(|quantity| *quantity != TetQuantity::Region);
+    *legend = named.map(|quantity| Legend { label: quantity.name().to_owned(), scale });
     edits.push(Edit::Cells(Some(cell_style(cells, scale, quantity.is_some()))));
     Ok(())
 }
@@ -125,21 +176,29 @@ fn resize<T: Default>(own: &mut Vec<T>, count: usize, first: u32, edits: &mut Ed
     own.resize_with(count, T::default);
 }
 
-fn list_isosurfaces<'a>(
-    own: &'a mut Vec<Isosurface>,
-    input: &Input<'a>,
+/// Lists a surface for each of `states`, from number `first` on.
+fn list_each<'a, T: Default, S>(
+    own: &'a mut Vec<T>,
+    first: u32,
+    states: &[S],
     edits: &mut Edits<'a>,
+    update: impl Fn(&'a mut T, u32, &S) -> Result<Edit<'a>>,
 ) -> Result<()> {
-    let states = &input.state.isosurfaces;
-    resize(own, states.len(), ISOSURFACES, edits);
-    for (key, (own, state)) in (ISOSURFACES..).zip(own.iter_mut().zip(states)) {
-        edits.push(own.update(input, key, state)?);
+    resize(own, states.len(), first, edits);
+    for (key, (own, state)) in (first..).zip(own.iter_mut().zip(states)) {
+        edits.push(update(own, key, state)?);
     }
     Ok(())
 }
 
 impl Isosurface {
-    fn update<'a>(&'a mut self, input: &Input<'a>, key: u32, state: &IsosurfaceState) -> Result<Edit<'a>> {
+    fn update<'a>(
+        &'a mut self,
+        input: &Input<'a>,
+        by: &Option<Moves<'_>>,
+        key: u32,
+        state: &IsosurfaceState,
+    ) -> Result<Edit<'a>> {
         let was_whole = std::mem::replace(&mut self.is_whole, false);
         let mesh = MeshView { field: input.field, ..input.mesh };
         let middle = || {
@@ -154,41 +213,57 @@ impl Isosurface {
         let values = coloured.map(|field| self.surface.interpolate(&mesh, &input.values(field)));
         self.values = values.unwrap_or_default();
         let scale = coloured.map(|field| input.scale(field)).transpose()?;
-        self.is_whole = coloured.is_none();
+        (self.moves, self.slopes) = by.as_ref().map_or_else(Default::default, |by| {
+            let slopes = self.surface.slopes(&mesh, by.components()).into_iter();
+            let moves = by.at(|component| self.surface.interpolate(&mesh, component));
+            (moves, slopes.map(|slope| by.scaled(slope)).collect())
+        });
+        self.is_whole = coloured.is_none() && by.is_none();
         let own: &'a Self = self;
         let single = coloured.map_or(SingleValues::PLAIN, |field| input.single(field));
         Ok(Edit::Surface {
             key,
-            triangles: Triangles { values: &own.values, single, ..Triangles::from(&own.surface) },
+            triangles: Triangles { values: &own.values, single, ..own.triangles() },
             changes: (was_whole && own.is_whole).then_some(&own.changes),
             style: isosurface_style(state, scale),
         })
     }
+
+    pub(super) fn triangles(&self) -> Triangles<'_> {
+        Triangles { moves: &self.moves, slopes: &self.slopes, ..Triangles::from(&self.surface) }
+    }
 }
 
-/// Lists sections as surfaces from number `first` on.
-fn list_sections<'a>(
-    own: &'a mut Vec<Section>,
-    first: u32,
-    input: &Input<'a>,
-    states: &[SliceState],
-    edits: &mut Edits<'a>,
-) -> Result<()> {
-    resize(own, states.len(), first, edits);
-    for (key, (own, state)) in (first..).zip(own.iter_mut().zip(states)) {
-        edits.push(own.update(input, key, state)?);
+impl<S> Displaced<S>
+where
+    for<'a> Triangles<'a>: From<&'a S>,
+{
+    /// Moves its vertices, of which `at` interpolates fields.
+    fn follow(&mut self, by: &Option<Moves<'_>>, at: impl Fn(&S, &[f64]) -> Vec<f64>) {
+        self.moves = by.as_ref().map_or_else(Vec::new, |by| by.at(|field| at(&self.surface, field)));
     }
-    Ok(())
+
+    pub(super) fn triangles(&self) -> Triangles<'_> {
+        Triangles { moves: &self.moves, ..Triangles::from(&self.surface) }
+    }
 }
 
 impl Section {
-    fn update<'a>(&'a mut self, input: &Input<'a>, key: u32, state: &SliceState) -> Result<Edit<'a>> {
+    fn update<'a>(
+        &'a mut self,
+        input: &Input<'a>,
+        by: &Option<Moves<'_>>,
+        key: u32,
+        state: &SliceState,
+    ) -> Result<Edit<'a>> {
         let field = input.field("slices", state.field.as_ref())?;
         let plane = state.plane();
         self.slice.extract(&input.mesh, &plane.plane());
         let is_other = field != input.shown;
         let values = is_other.then(|| self.slice.interpolate(&input.mesh, &(input.fields)(field)));
         self.values = values.unwrap_or_default();
+        let moves = by.as_ref().map(|by| by.at(|component| self.slice.interpolate(&input.mesh, component)));
+        self.moves = moves.unwrap_or_default();
         self.inner_sides = self.slice.cell_sides().iter().map(|sides| !sides & 7).collect();
         let style = Style {
             colouring: Colouring::Scale(input.scale(field)?),
@@ -198,27 +273,37 @@ impl Section {
             clips: if state.clipped { other_clips(&clips(input.state), &plane.clip()) } else { 0 },
         };
         let own: &'a Self = self;
-        let mut triangles = Triangles { inner_sides: &own.inner_sides, ..Triangles::from(&own.slice) };
+        let mut triangles = Triangles { inner_sides: &own.inner_sides, ..own.triangles() };
         triangles.single = input.single(field);
         if is_other {
             triangles.values = &own.values;
         }
         Ok(Edit::Surface { key, triangles, changes: None, style })
     }
+
+    pub(super) fn triangles(&self) -> Triangles<'_> {
+        Triangles { moves: &self.moves, ..Triangles::from(&self.slice) }
+    }
 }
 
 fn list_boundary<'a>(
-    own: &'a mut BoundarySurface,
+    (own, by_color): (&'a mut Displaced<BoundarySurface>, &'a mut Vec<Displaced<BoundarySurface>>),
     caps: &'a mut Vec<Section>,
     input: &Input<'a>,
+    by: &Option<Moves<'_>>,
     edits: &mut Edits<'a>,
 ) -> Result<()> {
     let Some(boundary) = &input.state.boundary else {
         edits.push(Edit::Remove(BOUNDARY));
+        resize(by_color, 0, REGIONS, edits);
         resize(caps, 0, CAPS, edits);
         return Ok(());
     };
-    own.extract(&input.mesh);
+    own.surface.extract(&input.mesh);
+    own.follow(by, BoundarySurface::interpolate);
+    let own = &*own;
+    let is_by_region = boundary.colour.is_none() && boundary.colour_by == ColourBy::Region;
+    let colors = if is_by_region { &input.colors[..] } else { &[] };
     let scale = Colouring::Scale(input.scale(input.shown)?);
     let style = Style {
         colouring: boundary.colour.map_or(scale, |colour| Colouring::Sides([colour.rgb(); 2])),
@@ -227,8 +312,26 @@ fn list_boundary<'a>(
         edges: boundary.edges.then(EdgeLook::default),
         clips: if boundary.clipped { u32::MAX } else { 0 },
     };
-    let triangles = Triangles { single: input.single(input.shown), ..Triangles::from(&*own) };
-    edits.push(Edit::Surface { key: BOUNDARY, triangles, changes: None, style });
+    resize(by_color, if colors.is_empty() { 0 } else { REGION_COLORS.into() }, REGIONS, edits);
+    if colors.is_empty() {
+        let triangles = Triangles { single: input.single(input.shown), ..own.triangles() };
+        edits.push(Edit::Surface { key: BOUNDARY, triangles, changes: None, style });
+    } else {
+        edits.push(Edit::Remove(BOUNDARY));
+        for (color, part) in (0..).zip(by_color.iter_mut()) {
+            if !colors.contains(&color) {
+                edits.push(Edit::Remove(REGIONS + u32::from(color)));
+                continue;
+            }
+            let has_color = |tet: u32| colors[usize::from(input.regions[tet as usize])] == color;
+            part.surface.extract_of(&input.mesh, has_color);
+            part.follow(by, BoundarySurface::interpolate);
+            let colour = Colour(region_color(color)).rgb();
+            let style = Style { colouring: Colouring::Sides([colour; 2]), ..style };
+            let (key, triangles) = (REGIONS + u32::from(color), part.triangles());
+            edits.push(Edit::Surface { key, triangles, changes: None, style });
+        }
+    }
     let cap = |ClipPlane { normal, offset }| SliceState {
         normal,
         offset,
@@ -239,10 +342,32 @@ fn list_boundary<'a>(
     };
     // What the planes cut open is closed.
     let cutting = if boundary.clipped { clips(input.state) } else { Vec::new() };
-    list_sections(caps, CAPS, input, &cutting.into_iter().map(cap).collect::<Vec<_>>(), edits)
+    let cutting: Vec<SliceState> = cutting.into_iter().map(cap).collect();
+    list_each(caps, CAPS, &cutting, edits, |own, key, state| own.update(input, by, key, state))
 }
 
-fn streamlines<'a>(own: &'a mut Solids, input: &Input<'a>, legend: &mut Option<Legend>) -> Result<Edit<'a>> {
+fn list_undeformed<'a>(own: &'a mut BoundarySurface, input: &Input<'a>, edits: &mut Edits<'a>) {
+    if !input.state.deform.as_ref().is_some_and(|deform| deform.undeformed) {
+        edits.push(Edit::Remove(UNDEFORMED));
+        return;
+    }
+    own.extract(&input.mesh);
+    let style = Style {
+        colouring: Colouring::Sides([GHOST; 2]),
+        opacity: GHOST_OPACITY,
+        lighting: Lighting::Flat,
+        ..Style::default()
+    };
+    let triangles = Triangles { values: &[], ..Triangles::from(&*own) };
+    edits.push(Edit::Surface { key: UNDEFORMED, triangles, changes: None, style });
+}
+
+fn streamlines<'a>(
+    own: &'a mut Displaced<Solids>,
+    input: &Input<'a>,
+    by: &Option<Moves<'_>>,
+    legend: &mut Option<Legend>,
+) -> Result<Edit<'a>> {
     let Some(StreamlineState { fields, seeds, radius, field }) = &input.state.streamlines else {
         return Ok(Edit::Remove(TUBES));
     };
@@ -260,17 +385,23 @@ fn streamlines<'a>(own: &'a mut Solids, input: &Input<'a>, legend: &mut Option<L
     let options = TubeOptions { radius, ..TubeOptions::default() };
     let values = field.as_ref().map(|_| input.field("streamlines.field", field.as_ref())).transpose()?;
     match values {
-        None => own.set_tubes(&lines, &options),
+        None => own.surface.set_tubes(&lines, &options),
         Some(field) => {
             let numbers = (input.fields)(field);
             let mesh = MeshView { field: &numbers, ..input.mesh };
-            own.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
+            own.surface.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
         }
     }
+    own.follow(by, |tubes, component| tubes.interpolate(&input.mesh, component));
     solids(own, input, TUBES, values, ("speed", input.lengths(fields)), legend)
 }
 
-fn arrow_list<'a>(own: &'a mut Solids, input: &Input<'a>, legend: &mut Option<Legend>) -> Result<Edit<'a>> {
+fn arrow_list<'a>(
+    own: &'a mut Displaced<Solids>,
+    input: &Input<'a>,
+    by: &Option<Moves<'_>>,
+    legend: &mut Option<Legend>,
+) -> Result<Edit<'a>> {
     let Some(ArrowState { fields, spacing, field, constant }) = &input.state.arrows else {
         return Ok(Edit::Remove(ARROWS));
     };
@@ -282,21 +413,23 @@ fn arrow_list<'a>(own: &'a mut Solids, input: &Input<'a>, legend: &mut Option<Le
         length: if *constant { ArrowLength::Constant } else { ArrowLength::Magnitude },
     };
     let components = [&*vectors[0], &vectors[1], &vectors[2]];
-    own.set_arrows(input.mesh, components, numbers.as_deref(), &options);
+    own.surface.set_arrows(input.mesh, components, numbers.as_deref(), &options);
+    own.follow(by, |arrows, component| arrows.interpolate(&input.mesh, component));
     solids(own, input, ARROWS, values, ("magnitude", input.lengths(fields)), legend)
 }
 
 /// Tubes or arrows, coloured by a field or by `own`, the name and the range of what they are made of.
 fn solids<'a>(
-    solids: &'a Solids,
+    solids: &'a Displaced<Solids>,
     input: &Input<'a>,
     key: u32,
     field: Option<usize>,
     (own, lengths): (&str, [f64; 2]),
     legend: &mut Option<Legend>,
 ) -> Result<Edit<'a>> {
-    let single = field.map_or_else(|| SingleValues::of_values(&solids.values), |field| input.single(field));
-    let triangles = Triangles { single, ..Triangles::from(solids) };
+    let single =
+        field.map_or_else(|| SingleValues::of_values(&solids.surface.values), |field| input.single(field));
+    let triangles = Triangles { single, ..solids.triangles() };
     let scale = match field {
         Some(field) => input.scale(field)?,
         None => scale(&input.state.colours, None, lengths)?,
@@ -311,12 +444,14 @@ fn solids<'a>(
 /// The legend of the field, unless tetrahedra have one of their own.
 fn update_legend(shown: &mut Option<Legend>, input: &Input<'_>) -> Result<()> {
     let state = input.state;
-    if state.cells.as_ref().is_some_and(|cells| quantity(cells).is_ok_and(|found| found.is_some())) {
+    if input.quantity()?.is_some() {
         return Ok(());
     }
     let is_mapped = state.volume.as_ref().is_some_and(|volume| volume.points.is_empty())
         || !state.slices.is_empty()
-        || state.boundary.as_ref().is_some_and(|boundary| boundary.colour.is_none())
+        || state.boundary.as_ref().is_some_and(|boundary| {
+            boundary.colour.is_none() && (boundary.colour_by == ColourBy::Field || input.colors.is_empty())
+        })
         || state.cells.is_some();
     let own = state.isosurfaces.iter().find_map(|surface| surface.field.as_ref());
     let is_mapped = is_mapped || input.largest_difference.is_some();

@@ -1,6 +1,7 @@
 //! What a scene shows, as plain data: it can be saved, sent and compared.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt;
 use tetralod::geom::Bounds;
 use tetralod::view::{ClipPlane, Colormap, Plane, VIRIDIS};
 
@@ -25,6 +26,8 @@ pub struct SceneState {
     pub streamlines: Option<StreamlineState>,
     /// Arrows of a vector field.
     pub arrows: Option<ArrowState>,
+    /// What displaces all that is shown.
+    pub deform: Option<DeformState>,
     /// What is cut away.
     pub clips: Vec<PlaneState>,
     /// A box outside of which everything is cut away: `[x0, y0, z0, x1, y1, z1]`.
@@ -37,6 +40,10 @@ pub struct SceneState {
     pub shade: f64,
     /// Whether the box around the domain is drawn.
     pub outline: bool,
+    /// The regions that are shown, by their names or labels; all if there is no list. What is drawn of the others is nothing.
+    pub regions: Option<Vec<RegionName>>,
+    /// Of the tetrahedra, those alone that are within a range of a field.
+    pub threshold: Option<ThresholdState>,
     /// A box with handles: `[x0, y0, z0, x1, y1, z1]`. A picture only.
     pub region: Option<[f64; 6]>,
     /// The mesh beside the one that was kept: see [`Scene::keep`](super::Scene::keep).
@@ -53,16 +60,50 @@ impl Default for SceneState {
             cells: None,
             streamlines: None,
             arrows: None,
+            deform: None,
             clips: Vec::new(),
             clip_box: None,
             colours: ColourState::default(),
             background: Background::default(),
             shade: 0.5,
             outline: true,
+            regions: None,
+            threshold: None,
             region: None,
             compare: None,
         }
     }
+}
+
+/// What a region of a file is called in a scene.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum RegionName {
+    /// Its label, where a single array tells regions apart.
+    Label(i64),
+    /// Its name.
+    Name(String),
+}
+
+impl fmt::Display for RegionName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Label(label) => label.fmt(f),
+            Self::Name(name) => name.fmt(f),
+        }
+    }
+}
+
+/// Which tetrahedra are shown, as a whole: those whose four vertices have a value within a range. What is drawn of the others is nothing, so
+/// the boundary is that of what is shown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThresholdState {
+    /// The name of the field; the one that is shown if it is left out.
+    #[serde(default)]
+    pub field: Option<String>,
+    /// The least and the largest value, in units of the field; both ends belong to it.
+    pub range: [f64; 2],
 }
 
 /// The points of a plane: `normal · p = offset`. As a clip plane it cuts away the side that the normal points to.
@@ -179,14 +220,31 @@ pub struct BoundaryState {
     pub edges: bool,
     /// One colour instead of those of the values.
     pub colour: Option<Colour>,
+    /// What gives it its colours, where it has not one alone.
+    pub colour_by: ColourBy,
     /// Whether clip planes cut it, and what they cut open is closed.
     pub clipped: bool,
 }
 
 impl Default for BoundaryState {
     fn default() -> Self {
-        Self { opacity: 1.0, edges: false, colour: None, clipped: true }
+        Self { opacity: 1.0, edges: false, colour: None, colour_by: ColourBy::Field, clipped: true }
     }
+}
+
+/// What the boundary is coloured by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "&'static str")]
+pub enum ColourBy {
+    /// The values of the field.
+    #[default]
+    Field,
+    /// The regions, each with a colour of its own. Without regions it is the field.
+    Region,
+}
+
+impl ColourBy {
+    const NAMES: [(Self, &'static str); 2] = [(Self::Field, "field"), (Self::Region, "region")];
 }
 
 /// The tetrahedra.
@@ -278,6 +336,7 @@ macro_rules! named {
 }
 
 named!(CellKind);
+named!(ColourBy);
 named!(Background);
 
 /// Tubes along a vector field.
@@ -306,6 +365,33 @@ pub struct ArrowState {
     pub field: Option<String>,
     /// Whether all have the same length.
     pub constant: bool,
+}
+
+/// Everything is drawn where a vector field displaces it, by so many times the vector at each place.
+///
+/// Places of the state itself are those of the model as it is: planes, boxes and seeds. What they cut moves along, and so does what they
+/// are a section of.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "camelCase")]
+pub struct DeformState {
+    /// The name of the vector. Its components are the fields that the file says so of, those of this name with `_x`, `_y` and `_z`, or three
+    /// that it lists with commas between them.
+    pub field: String,
+    /// How many times the vector. If it is left out, nothing goes farther than [`Deformation::AUTOMATIC`](tetralod::session::Deformation::AUTOMATIC) of the domain's
+    /// diagonal: by the ranges of the components, so at all times and in all meshes the same.
+    pub factor: Option<f64>,
+    /// For what swings: how much of a period has passed. The displacement is that times the sine: none at 0, all at 0.25, against the
+    /// vector at 0.75. If it is left out, all of it.
+    pub phase: Option<f64>,
+    /// Whether the boundary as it is without displacement is drawn, too, so that one sees through it.
+    pub undeformed: bool,
+}
+
+impl DeformState {
+    /// The same with another factor and at another phase.
+    pub(super) fn at_rest(&self) -> Self {
+        Self { factor: None, phase: None, ..self.clone() }
+    }
 }
 
 /// The mesh that was kept on the left, the current one on the right.
@@ -338,11 +424,20 @@ pub struct ColourState {
     pub reversed: bool,
     /// Whether the scale is logarithmic. Without a range it has the positive part of the values; without such a part it is linear.
     pub log: bool,
+    /// How many colours there are, each for an equal part of the range: 2 to 64. Without it they run into one another.
+    #[serde(deserialize_with = "number_of_bands")]
+    pub bands: Option<u8>,
+}
+
+/// What is no such number becomes 0, which is refused like all that are too small.
+fn number_of_bands<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u8>, D::Error> {
+    let number = Option::<f64>::deserialize(from)?;
+    Ok(number.map(|number| if number.fract() == 0.0 { number as u8 } else { 0 }))
 }
 
 impl Default for ColourState {
     fn default() -> Self {
-        Self { map: MapName(VIRIDIS), range: None, reversed: false, log: false }
+        Self { map: MapName(VIRIDIS), range: None, reversed: false, log: false, bands: None }
     }
 }
 

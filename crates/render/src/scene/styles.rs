@@ -18,10 +18,11 @@ pub(super) fn scale(
     range: Option<[f64; 2]>,
     [low, high]: [f64; 2],
 ) -> Result<ColourScale, SceneError> {
-    let ColourState { map, reversed, log, .. } = *colours;
+    let ColourState { map, reversed, log, bands, .. } = *colours;
     let is_log = log && (range.is_some() || high > 0.0);
     let own = if is_log && low <= 0.0 { [LOG_START * high, high] } else { [low, high] };
-    let scale = ColourScale { map: map.0, range: range.unwrap_or(own), is_reversed: reversed, is_log };
+    let bands = bands.unwrap_or(0);
+    let scale = ColourScale { map: map.0, range: range.unwrap_or(own), is_reversed: reversed, is_log, bands };
     Ok(scale.validate()?)
 }
 
@@ -94,22 +95,35 @@ pub(super) fn medium(volume: &VolumeState, scale: &ColourScale, diagonal: f64) -
     Medium::new(&coloured(opacities, scale), unit_length)
 }
 
+/// As far beside a fraction, the colour is that of the next band.
+const BESIDE: f64 = 1e-9;
+
 /// Colours between two values of the scale, even in its own terms.
 const COLOURS: usize = 64;
 
 /// The values of `opacities` and of the colours of the scale, with both.
 fn coloured(opacities: &[[f64; 2]], scale: &ColourScale) -> Vec<(f64, [f64; 4])> {
-    let own = (0..=COLOURS).map(|i| scale.value(i as f64 / COLOURS as f64));
+    // Bands are steps, of two colours at a value.
+    let bands = usize::from(scale.bands);
+    let count = if bands > 1 { bands } else { COLOURS };
+    let own = (0..=count).map(|i| scale.value(i as f64 / count as f64));
     let mut values: Vec<f64> = opacities.iter().map(|point| point[0]).chain(own).collect();
     values.sort_unstable_by(f64::total_cmp);
     values.dedup();
     let mut points = Vec::new();
     for value in values {
-        let [r, g, b] = scale.colour(value).map(f64::from);
-        // Several opacities at one value are a step.
+        // Several opacities at one value are a step, and so is where bands meet.
         let same: Vec<f64> = opacities.iter().filter(|p| p[0] == value).map(|p| p[1]).collect();
-        let steps = if same.is_empty() { vec![opacity_at(opacities, value)] } else { same };
-        points.extend(steps.into_iter().map(|opacity| (value, [r, g, b, opacity])));
+        let own = || opacity_at(opacities, value);
+        let ends = [same.first(), same.last()].map(|end| end.copied().unwrap_or_else(own));
+        let away = if bands > 1 { BESIDE } else { 0.0 };
+        let colours = [-away, away].map(|away| scale.colour_at(scale.fraction(value) + away).map(f64::from));
+        let [below, above] = [0, 1].map(|side| {
+            let [r, g, b] = colours[side];
+            (value, [r, g, b, ends[side]])
+        });
+        points.push(below);
+        points.extend((above != below).then_some(above));
     }
     points
 }

@@ -24,11 +24,16 @@ struct Frame {
     // The screen's top and bottom: sRGB and opacity.
     sky: vec4f,
     ground: vec4f,
+    // How many times its move each thing is displaced (y, z, w unused).
+    moved: vec4f,
     // Points with xyz . p > w are cut away.
     clips: array<vec4f, 16>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
+
+// Whether what is drawn has moves. Twin: `Variant` in `gpu/pipeline.rs`.
+override HAS_MOVES: bool = false;
 
 struct Ray {
     origin: vec3f,

@@ -18,6 +18,8 @@
 @group(1) @binding(5) var<storage, read> nodes: array<u32>;
 @group(1) @binding(6) var<uniform> settings: Settings;
 @group(1) @binding(7) var depths: texture_depth_multisampled_2d;
+// Where each point goes, if they have moves (w unused).
+@group(1) @binding(8) var<storage, read> moves: array<vec4f>;
 
 // Twin: `Settings` in `gpu/composite.rs`.
 struct Settings {
@@ -27,6 +29,8 @@ struct Settings {
     // the clip planes that apply to the volume, a bit each (w unused).
     corners: vec4u,
     start: vec4u,
+    // Where the eye is in a tetrahedron that is not displaced (w unused).
+    eye: vec4f,
 }
 
 const NONE = 0xffffffffu;
@@ -52,8 +56,10 @@ var<private> transmittance: f32;
 var<private> head: u32;
 var<private> layer: Fragment;
 var<private> opaque: f32;
-// The part of the ray that is not cut away.
+// The part of the ray that is not cut away: of all of it, or of what is displaced in the tetrahedron that it goes through.
 var<private> limits: vec2f;
+// Where it ends.
+var<private> farthest: f32;
 
 // Of a value: emission and extinction, and their integrals up to it.
 struct Entry {
@@ -191,6 +197,34 @@ fn go_through(enter: vec2f, leave: vec2f) {
     held_piece(here, leave);
 }
 
+// Where the crossing of a face was before it was displaced; its points as the ray sees them.
+fn rest_of(ids: vec3u, a: SeenPoint, b: SeenPoint, c: SeenPoint) -> vec3f {
+    let areas = vec3f(area(b, c), area(c, a), area(a, b));
+    let weights = max(areas * select(1.0, -1.0, areas.x + areas.y + areas.z < 0.0), vec3f(0.0));
+    let sum = weights.x + weights.y + weights.z;
+    let corners = mat3x3f(points[ids.x].xyz, points[ids.y].xyz, points[ids.z].xyz);
+    return select(corners * weights / sum, corners[0], sum == 0.0);
+}
+
+// Sets the limits to what the clip planes leave between two places of a displaced tetrahedron: they cut where these places were before.
+fn limit(from_rest: vec3f, to_rest: vec3f, enter: f32, leave: f32) {
+    var part = vec2f(0.0, 1.0);
+    for (var i = 0u; i < u32(frame.viewport.w); i += 1u) {
+        if ((settings.start.z >> i) & 1u) == 1u {
+            let plane = frame.clips[i];
+            let first = dot(plane.xyz, from_rest) - plane.w;
+            let last = dot(plane.xyz, to_rest) - plane.w;
+            let crossed = first / (first - last);
+            if first > 0.0 {
+                part.x = max(part.x, select(2.0, crossed, last < 0.0));
+            } else if last > 0.0 {
+                part.y = min(part.y, crossed);
+            }
+        }
+    }
+    limits = vec2f(enter + part.x * (leave - enter), min(opaque, enter + part.y * (leave - enter)));
+}
+
 // Which of the neighbours of a tetrahedron is opposite `point`, the others being `a`, `b` and `c`.
 fn rank(point: u32, a: u32, b: u32, c: u32) -> u32 {
     return u32(point > a) + u32(point > b) + u32(point > c);
@@ -208,6 +242,9 @@ fn march_from_inside(by: Across) {
         let is_crossed = all(x >= vec3f(0.0)) || all(x <= vec3f(0.0));
         let leave = crossing(corners[0], corners[1], corners[2]);
         if is_crossed && leave.x > 0.0 {
+            if HAS_MOVES {
+                limit(settings.eye.xyz, rest_of(ids, corners[0], corners[1], corners[2]), 0.0, leave.x);
+            }
             go_through(vec2f(0.0, bitcast<f32>(settings.start.y)), leave);
             march(ids, tets[5u * settings.start.x + rank(c[k], ids.x, ids.y, ids.z)], by);
             return;
@@ -230,9 +267,13 @@ fn march(face: vec3u, first: u32, by: Across) {
     }
     var tet = first;
     var enter = crossing(a, b, c);
+    var enter_rest = vec3f(0.0);
+    if HAS_MOVES {
+        enter_rest = rest_of(ids, a, b, c);
+    }
     // A ray meets each tetrahedron once at most.
     let most = arrayLength(&tets) / 5u;
-    for (var step = 0u; step < most && tet != NONE && transmittance > DARK && enter.x < limits.y; step += 1u) {
+    for (var step = 0u; step < most && tet != NONE && transmittance > DARK && enter.x < farthest; step += 1u) {
         let new_point = tets[5u * tet + 4u] ^ ids.x ^ ids.y ^ ids.z;
         let d = seen(new_point, by);
         let x = vec3f(area(a, d), area(b, d), area(c, d));
@@ -253,6 +294,11 @@ fn march(face: vec3u, first: u32, by: Across) {
         tet = tets[5u * tet + left];
         let there = crossing(a, b, c);
         let leave = vec2f(max(there.x, enter.x), there.y);
+        if HAS_MOVES {
+            let leave_rest = rest_of(ids, a, b, c);
+            limit(enter_rest, leave_rest, enter.x, leave.x);
+            enter_rest = leave_rest;
+        }
         go_through(enter, leave);
         enter = leave;
     }
@@ -264,7 +310,7 @@ fn march_all(by: Across) {
         march_from_inside(by);
     }
     for (var entry = fragment_after(BEFORE_ALL, 0u);; entry = fragment_after(entry, 0u)) {
-        if entry.distance >= limits.y || transmittance <= DARK {
+        if entry.distance >= farthest || transmittance <= DARK {
             break;
         }
         take_layers(entry.distance);
@@ -276,6 +322,9 @@ fn march_all(by: Across) {
 // The part of a ray that the clip planes leave of the volume, up to what is opaque.
 fn kept(ray: Ray) -> vec2f {
     var range = vec2f(-FAR, opaque);
+    if HAS_MOVES {
+        return range;
+    }
     for (var i = 0u; i < u32(frame.viewport.w); i += 1u) {
         if ((settings.start.z >> i) & 1u) == 1u {
             let plane = frame.clips[i];
@@ -328,6 +377,7 @@ fn fs(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     transmittance = 1.0;
     opaque = distance_of(middle_depth(vec2i(pixel.xy)), ray);
     limits = kept(ray);
+    farthest = limits.y;
     head = heads[1u + u32(pixel.y) * u32(frame.viewport.x) + u32(pixel.x)];
     layer = fragment_after(BEFORE_ALL, IS_COLOUR);
     if settings.table.z > 0.0 {

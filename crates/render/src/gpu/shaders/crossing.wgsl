@@ -22,7 +22,10 @@ fn across_of(ray: Ray) -> Across {
 }
 
 fn seen(point: u32, by: Across) -> SeenPoint {
-    let p = points[point];
+    var p = points[point];
+    if HAS_MOVES {
+        p += vec4f(frame.moved.x * moves[point].xyz, 0.0);
+    }
     let away = p.xyz - by.ray.origin;
     return SeenPoint(vec2f(dot(away, by.u), dot(away, by.v)), dot(away, by.ray.direction), p.w);
 }

@@ -3,10 +3,10 @@
 
 // What the style takes: 0 for smooth, 1 for flat, 2 for no light; whether values give colours, whether there are edges, and
 // clip planes. Twin: `Variant` in `gpu/pipeline.rs`.
-override LIGHT: u32;
-override HAS_VALUES: bool;
-override HAS_EDGES: bool;
-override HAS_CLIPS: bool;
+override LIGHT: u32 = 2u;
+override HAS_VALUES: bool = false;
+override HAS_EDGES: bool = false;
+override HAS_CLIPS: bool = false;
 
 struct Style {
     // The sides that are seen from lower and from higher values: linear; in w of the first opacity.
@@ -17,10 +17,10 @@ struct Style {
     scale: vec4f,
     // Of edges: sRGB and strength.
     edge: vec4f,
-    // In units of the page's layout, the width of edges (y unused); how much tetrahedra are shrunk; diameter of points in
+    // In units of the page's layout, the width of edges; the number of colours, or 0 if they run into one another; how much tetrahedra are shrunk; diameter of points in
     // units of the page's layout.
     shape: vec4f,
-    // The clip planes that apply, a bit each; whether each tetrahedron has a value (z, w unused).
+    // The clip planes that apply, a bit each; whether each tetrahedron has a value; of a surface, numbers a vertex in its moves (w unused).
     clips: vec4u,
     // Tetrahedra with their centroid at xyz . p > w are taken away.
     cut: vec4f,
@@ -66,7 +66,10 @@ fn logarithm(value: f32) -> f32 {
 // The colour of a value on the scale: linear.
 fn mapped(value: f32) -> vec3f {
     let even = select(value, logarithm(value), style.scale.z > 0.0);
-    let place = clamp((even - style.scale.x) * style.scale.y, 0.0, 1.0) * 255.0;
+    let fraction = clamp((even - style.scale.x) * style.scale.y, 0.0, 1.0);
+    let bands = style.shape.y;
+    let banded = min(floor(fraction * bands), bands - 1.0) / max(bands - 1.0, 1.0);
+    let place = select(fraction, banded, bands > 0.0) * 255.0;
     let below = min(u32(place), 254u);
     return decode(mix(palette_entry(below), palette_entry(below + 1u), place - f32(below)));
 }

@@ -7,6 +7,8 @@
 @group(1) @binding(0) var<storage, read> points: array<vec4f>;
 // Three points, and the tetrahedron behind.
 @group(1) @binding(1) var<storage, read> faces: array<vec4u>;
+// Where each point goes, if they have moves (w unused).
+@group(1) @binding(2) var<storage, read> moves: array<vec4f>;
 
 struct Vertex {
     @builtin(position) clip: vec4f,
@@ -17,7 +19,11 @@ struct Vertex {
 const LARGER = 0.0625;
 
 fn clip_of(point: u32) -> vec4f {
-    return frame.view_projection * vec4f(points[point].xyz, 1.0);
+    var place = points[point].xyz;
+    if HAS_MOVES {
+        place += frame.moved.x * moves[point].xyz;
+    }
+    return frame.view_projection * vec4f(place, 1.0);
 }
 
 // The direction on the screen from one point to another, in pixels.
