@@ -10,6 +10,7 @@ const MESH = /\.(vtu|vti|vts|vtr|vtk|raw|json)$/i;
 
 /** What the phases of the work are called. @type {Record<string, string>} */
 const PHASES = {
+  wait: "Waiting",
   read: "Reading the file",
   parse: "Decoding",
   repair: "Checking the mesh",
@@ -19,6 +20,9 @@ const PHASES = {
   order: "Putting updates in order",
   encode: "Writing",
 };
+
+/** What a phase of the work is called. @param {string} phase */
+export const phaseWords = (phase) => PHASES[phase] ?? phase;
 
 /** What is said where there are fields at cells. */
 const AT_CELLS =
@@ -221,7 +225,7 @@ class BuildDialog {
   #showProgress({ phase, fraction, tetrahedra }) {
     this.#bar.value = fraction;
     const left = tetrahedra === undefined ? "" : `, ${count(tetrahedra)} tetrahedra`;
-    this.#status.textContent = `${PHASES[phase]}${left}`;
+    this.#status.textContent = `${phaseWords(phase)}${left}`;
   }
 
   /** @param {File} file @param {import("tetralod/build").BuildReport} report */

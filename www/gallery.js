@@ -3,16 +3,18 @@
  * page looks for a new one when it gets the focus, and while a volume is being made.
  */
 
+import { phaseWords } from "./build.js";
 import { $, dialog, element, input, select } from "./dom.js";
 import { count, size, vtuBytes } from "./format.js";
-import { note } from "./messages.js";
+import { stateNow } from "./history.js";
+import { note, say } from "./messages.js";
 import { open } from "./opening.js";
 import { source } from "./source.js";
 import { read } from "./state.js";
 import { pictureOf, taken, takePicture } from "./thumbnails.js";
 
 const LIST = "data/volumes.json";
-/** How often it is looked whether a volume in the making is ready (in ms). */
+/** How often it is looked whether a volume in the making is ready, if the list does not say (in ms). */
 const LOOK = 15_000;
 
 /**
@@ -27,31 +29,96 @@ const LOOK = 15_000;
  * @property {number} tetrahedra
  * @property {number} fields
  * @property {number} bytes
+ * @property {string} [version] another one when the file is another one
+ */
+
+/**
+ * A volume that is being made, and how far it is: `done` of `total` of a stage.
+ *
+ * @typedef {{ title: string, isShown: boolean, stage?: string, done?: number, total?: number }} Pending
  */
 
 /** @type {Listed[]} */
 let volumes = [];
-/** @type {{ title: string, isShown: boolean }[]} */
+/** @type {Pending[]} */
 let pending = [];
+/** What could not be made. @type {{ title: string, message: string }[]} */
+let failed = [];
+/** Hears of the first volume, where there was none before. @type {(first: Listed) => unknown} */
+let arrived = () => {};
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let timer;
 
 /** Reads the list; resolves to the volume that is shown where no address says another one. @returns {Promise<Listed | undefined>} */
 export async function readVolumes() {
   // The first time the page has asked for it ahead.
-  const isFirst = volumes.length === 0;
-  const list = await fetch(LIST, isFirst ? {} : { cache: "no-cache" })
+  const list = await fetch(LIST, isBeginning ? {} : { cache: "no-cache" })
     .then((response) => (response.ok ? response.json() : undefined))
     .catch(() => undefined);
-  if (!list) return volumes[0];
-  const before = new Set(volumes.map(({ url }) => url));
-  [volumes, pending] = [list.volumes, list.pending ?? []];
-  if (before.size > 0) announceNew(before);
+  clearTimeout(timer);
+  if (!list) {
+    // Who serves it may come back.
+    if (timer !== undefined) timer = setTimeout(readVolumes, LOOK);
+    return volumes[0];
+  }
+  const [before, failedBefore] = [volumes, failed];
+  [volumes, pending, failed] = [list.volumes, list.pending ?? [], list.failed ?? []];
+  if (pending.length > 0 || list.look) timer = setTimeout(readVolumes, list.look ?? LOOK);
+  showMaking();
+  const isSame = JSON.stringify([before, failedBefore]) === JSON.stringify([volumes, failed]);
+  if (isSame && list.look) return volumes[0];
+  if (before.length > 0) announceNew(new Set(before.map(({ url }) => url)));
   showList();
   showGallery();
-  clearTimeout(timer);
-  if (pending.length > 0) timer = setTimeout(readVolumes, LOOK);
+  sayFailed(failedBefore);
+  reload(before);
+  if (before.length === 0 && !isBeginning && volumes.length > 0) arrived(volumes[0]);
   return volumes[0];
+}
+
+/** The page has not begun to open anything. */
+let isBeginning = true;
+
+/** The page opens what it was asked for; `then` hears of the first volume, if that is made later. @param {typeof arrived} then */
+export function begun(then) {
+  isBeginning = false;
+  arrived = then;
+  showMaking();
+}
+
+/** How far what is being made is, while nothing is shown. */
+function showMaking() {
+  if (isBeginning || source.open !== undefined) return;
+  const [first] = pending;
+  const bar = $("progress", HTMLProgressElement);
+  if (!first) {
+    $("growth").textContent = "";
+    return;
+  }
+  const { title, stage = "", done = 0, total = 0 } = first;
+  const isKnown = total > 0;
+  if (isKnown) bar.value = done / total;
+  else bar.removeAttribute("value");
+  $("loading").classList.remove("done");
+  $("growth").textContent = `Building an MT file of ${title}: ${phaseWords(stage).toLowerCase()}${isKnown ? `, ${Math.floor((100 * done) / total)} %` : ""}`;
+}
+
+/** Whether something is made that will be shown. */
+export const isMaking = () => pending.length > 0;
+
+/** Says what could not be made. @param {typeof failed} before */
+function sayFailed(before) {
+  const isNew = (/** @type {{ title: string, message: string }} */ { title, message }) => !before.some((one) => one.title === title && one.message === message);
+  for (const { title, message } of failed.filter(isNew)) say(`No MT file could be built of ${title}`, { message });
+}
+
+/** Opens the volume that is shown again, as it is shown, if its file is another one now. @param {Listed[]} before */
+function reload(before) {
+  const now = listed(source.open);
+  const then = before.find(({ url }) => url === now?.url);
+  if (!now || !then || now.version === then.version) return;
+  note(`${now.title} has changed, and is shown anew`);
+  open(now.url, stateNow());
 }
 
 /** The picture of a volume before it has arrived. @param {string} url */

@@ -32,7 +32,7 @@ import { attachExtremes } from "./extremes.js";
 import { attachFields } from "./fields.js";
 import { attachFiles } from "./files.js";
 import { addSeed, attachFlow } from "./flow.js";
-import { attachGallery, openGallery, readVolumes, sceneOf, shown, showPoster } from "./gallery.js";
+import { attachGallery, begun, isMaking, openGallery, readVolumes, sceneOf, shown, showPoster } from "./gallery.js";
 import { attachHandles } from "./handles.js";
 import { attachHistogram } from "./histogram.js";
 import { attachHistory, hold } from "./history.js";
@@ -158,10 +158,8 @@ async function begin(listed) {
   const { url = "", ...words } = read(location.hash);
   const asked = new URLSearchParams(location.search).get("url");
   const first = asked ?? (await listed)?.url;
-  if (!first && !url) {
-    $("growth").textContent = "";
-    return openGallery();
-  }
+  begun((made) => begin(Promise.resolve(made)));
+  if (!first && !url) return isMaking() ? undefined : openGallery();
   source.first = first ?? "";
   const isPlain = !asked && Object.keys(words).length === 0 && !url;
   open(url, isPlain ? sceneOf(first) : words);

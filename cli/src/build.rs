@@ -123,6 +123,7 @@ fn finish(
         seconds: start.elapsed().as_secs_f64(),
         averaged: mt.info().averaged_fields(),
         size: extremes::size(mt.info()),
+        inputs: files::read_inputs(),
         ..known
     };
     verbosity.print(&report, &rows(output, &report))

@@ -59,6 +59,14 @@ pub fn note_inputs(files: &[PathBuf]) {
     inputs().extend(files.iter().filter_map(|file| fs::canonicalize(file).ok()));
 }
 
+/// All inputs that were read.
+pub fn read_inputs() -> Vec<PathBuf> {
+    let mut all = inputs().clone();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
 /// Refuses an output that is one of the inputs, or that has no place, before any work is done for it.
 pub fn check_output<'a>(path: &Path, given: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
     let name = path.display();

@@ -39,6 +39,7 @@ mod streamlines;
 mod surface;
 mod usage;
 mod verify;
+mod view;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
@@ -71,6 +72,7 @@ enum Command {
     Verify(verify::Arguments),
     Bench(bench::Arguments),
     Serve(serve::Arguments),
+    View(view::Arguments),
 }
 
 /// Lets glibc give freed memory back: by default it keeps some in an arena for each thread, and takes large arrays from the heap once one
@@ -102,7 +104,7 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<ExitCode> {
     // Serving has a handler of its own for Ctrl-C; there can be only one.
-    if !matches!(command, Command::Serve(_)) {
+    if !matches!(command, Command::Serve(_) | Command::View(_)) {
         files::remove_partial_output_on_interrupt()?;
     }
     match command {
@@ -123,6 +125,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Stats(arguments) => stats::run(&arguments)?,
         Command::Render(arguments) => render::run(&arguments)?,
         Command::Serve(arguments) => serve::run(&arguments)?,
+        Command::View(arguments) => view::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,5 +1,6 @@
 //! What goes to stdout: one JSON object for programs, lines for people.
 
+use crate::parse::named;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::borrow::Cow;
@@ -7,7 +8,7 @@ use std::io;
 use std::io::Write;
 
 /// How much a command that writes a file says about it.
-#[derive(clap::Args)]
+#[derive(Default, clap::Args)]
 pub struct Verbosity {
     /// No progress bar and no summary.
     #[arg(short, long)]
@@ -15,6 +16,17 @@ pub struct Verbosity {
     /// Print the summary as a JSON object, also with --quiet.
     #[arg(long)]
     json: bool,
+    /// How stderr shows the progress: as a bar, on a terminal alone, or as json, for programs: now and then a line
+    /// {"stage": "remove", "done": 1200, "total": 4800}, in which total may grow [default: bar].
+    #[arg(long, value_name = "HOW", value_parser = |text: &str| named(text, &[("bar", Progress::Bar), ("json", Progress::Json)]))]
+    pub progress: Option<Progress>,
+}
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    Bar,
+    Json,
 }
 
 impl Verbosity {

@@ -4,6 +4,7 @@ import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
+import { address } from "./browser.js";
 import {
   addressed,
   assertDrawn,
@@ -1057,6 +1058,49 @@ test("a volume that is being made is named, and can be opened once it is there",
   await page.waitForFunction((url) => new URLSearchParams(location.search).get("url") === url || location.href.includes(url), first.url);
   await reach(page, "complete");
   assert.equal(await page.locator("#volume").inputValue(), first.url);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the page follows a list that changes: how far a build is, its volume, a file that has changed, and one that cannot be built", async () => {
+  // As `tetralod view` gives it.
+  const listed = (await fetch(new URL("data/volumes.json", address())).then((answer) => answer.json())).volumes.find(({ url }) => url === SMALL);
+  const made = { ...listed, title: "part.vtu", sentence: "part.vtu", scene: "", version: "1" };
+  const empty = { volumes: [], pending: [], failed: [], look: 100 };
+  let list = { ...empty, pending: [{ title: "part.vtu", isShown: true, stage: "remove", done: 1, total: 4 }] };
+  const page = await newPage({ viewport: VIEWPORT.viewport });
+  page.complaints = [];
+  page.on("pageerror", (error) => page.complaints.push(String(error)));
+  await page.route("**/data/volumes.json", (route) => route.fulfill({ json: list }));
+  await page.goto(`${address()}#view=slice`);
+  const told = (words) => page.locator("#growth", { hasText: words }).waitFor({ timeout: PATIENCE });
+  await told("Building an MT file of part.vtu: removing vertices, 25 %");
+  assert.equal(await page.locator("#progress").evaluate(({ value }) => value), 0.25);
+  assert.ok(await page.locator("#gallery").isHidden());
+  list = { ...empty, pending: [{ title: "part.vtu", isShown: true, stage: "order", done: 0, total: 0 }] };
+  await told("part.vtu: putting updates in order");
+
+  // The volume comes as the address says.
+  list = { ...empty, volumes: [made] };
+  await reach(page, "complete");
+  assert.equal(await page.locator("[name=mode]:checked").getAttribute("value"), "slice");
+  assert.deepEqual(await page.locator("#volume option").allInnerTexts(), ["part.vtu"]);
+  await setSlider(page, "error", 60);
+
+  // What has changed is shown as it was; a build that goes on beside it is not in the way.
+  await page.evaluate(() => (window.tetralodDemo.state = "before"));
+  list = { ...empty, volumes: [{ ...made, version: "2" }], pending: [{ title: "part.vtu", isShown: true, stage: "remove", done: 1, total: 4 }] };
+  await page.locator("#note", { hasText: "part.vtu has changed, and is shown anew" }).waitFor({ timeout: PATIENCE });
+  await reach(page, "complete");
+  assert.equal(await page.inputValue("#error"), "60");
+  assert.equal(await page.locator("[name=mode]:checked").getAttribute("value"), "slice");
+
+  // What cannot be built leaves what is shown as it is.
+  list = { ...empty, volumes: [{ ...made, version: "2" }], failed: [{ title: "part.vtu", message: "part.vtu: cell 3 has no volume" }] };
+  await page.locator("#message", { hasText: "cell 3 has no volume" }).waitFor({ timeout: PATIENCE });
+  assert.match(await page.locator("#message").innerText(), /No MT file could be built of part.vtu/);
+  assert.equal(await demo(page, "state"), "complete");
+  await screenshot(page, "page-view");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

@@ -4,6 +4,7 @@ use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
 
+use crate::serve::Server;
 use crate::{package, shell};
 
 /// Checks the version and what would be uploaded; with a tag, such as `v0.1.0`, also that it names this version.
@@ -18,10 +19,22 @@ pub fn run(args: &[String]) -> Result<()> {
         _ => bail!("`release` takes one tag, got {}", args.join(" ")),
     }
     package::build(&[])?;
+    check_page()?;
     // They need each other, which are not on crates.io yet: cargo takes them from here.
     let mut publish = shell::cargo(["publish", "--dry-run", "--locked"]);
     shell::run(publish.args(package::PUBLISHED.iter().flat_map(|name| ["--package", name])))?;
     shell::run(shell::npm(["publish", "--dry-run", "--access", "public"]).current_dir(package::PKG))
+}
+
+/// Builds the command with the page inside, and checks that it serves the page and the package.
+fn check_page() -> Result<()> {
+    let program = shell::command_with_page()?;
+    println!("{}: {} bytes", program.display(), fs::metadata(&program)?.len());
+    let server = Server::of(shell::command(&program, ["view", "--no-browser", "--port", "0"]))?;
+    for (path, file) in [("", "www/index.html"), ("pkg/tetralod_viewer_bg.wasm", "pkg/tetralod_viewer_bg.wasm")] {
+        ensure!(server.get(path)? == fs::read(file)?, "`tetralod view` does not serve {file}");
+    }
+    Ok(())
 }
 
 /// A version that is published is no longer called unreleased.

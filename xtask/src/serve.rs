@@ -1,8 +1,9 @@
 //! The server of pages on localhost: `tetralod serve`, in a process of its own.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 
@@ -21,14 +22,31 @@ impl Server {
         let mut command = shell::command(tetralod, ["serve", folder, "--port"]);
         command.arg(port.to_string());
         command.args(mounts.iter().flat_map(|(at, folder)| ["--mount".to_owned(), format!("{at}={folder}")]));
-        let mut child = command.stdout(Stdio::piped()).spawn().context("cannot start `tetralod serve`")?;
+        Self::of(command)
+    }
+
+    /// What a command serves that prints its address first.
+    pub fn of(mut command: Command) -> Result<Self> {
+        let mut child = command.stdout(Stdio::piped()).spawn().context("cannot start the server")?;
         let mut line = String::new();
         if let Some(stdout) = child.stdout.take() {
             BufReader::new(stdout).read_line(&mut line)?;
         }
         let server = Self { child, address: line.trim().to_owned() };
-        ensure!(server.address.starts_with("http://"), "`tetralod serve {folder}` did not start");
+        ensure!(server.address.starts_with("http://"), "{command:?} did not start");
         Ok(server)
+    }
+
+    /// The file below this path.
+    pub fn get(&self, path: &str) -> Result<Vec<u8>> {
+        let host = self.address.trim_start_matches("http://").trim_end_matches('/');
+        let mut stream = TcpStream::connect(host).with_context(|| self.address.clone())?;
+        write!(stream, "GET /{path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")?;
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer)?;
+        let end = answer.windows(4).position(|four| four == b"\r\n\r\n").context("no answer")?;
+        ensure!(answer.starts_with(b"HTTP/1.1 200"), "{path} is not served");
+        Ok(answer.split_off(end + 4))
     }
 
     /// Serves until it is interrupted.

@@ -103,6 +103,12 @@ pub fn demo_command() -> Result<PathBuf> {
     Ok(kept)
 }
 
+/// The native command as users get it who have no checkout: with the page of `tetralod view` inside.
+pub fn command_with_page() -> Result<PathBuf> {
+    run(&mut cargo(["build", "--release", "--package", "tetralod-cli", "--features", "page"]))?;
+    Ok(built_in("release"))
+}
+
 /// The native command as users get it.
 pub fn released_command() -> Result<PathBuf> {
     run(&mut cargo(["build", "--release", "--package", "tetralod-cli"]))?;

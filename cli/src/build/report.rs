@@ -4,7 +4,7 @@ use crate::repair::Repair;
 use crate::restrictions::Angles;
 use crate::{extremes, output};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tetralod::mt::AveragedField;
 use tetralod_build::BuildSummary;
 
@@ -39,6 +39,8 @@ pub(super) struct Report {
     /// The diagonal of the domain, for people.
     #[serde(skip)]
     pub size: f64,
+    /// The files that were read, at their places without links.
+    pub inputs: Vec<PathBuf>,
     /// What the reader left out of the input or changed, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,

@@ -85,27 +85,54 @@ fn parse_mount(text: &str) -> Result<(String, PathBuf), String> {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let (router, path) = router(arguments)?;
-    let router = with_headers(router, arguments)?;
+    let shared = match arguments.cors.as_deref() {
+        Some("none") => Shared::Nothing,
+        None if arguments.path.is_dir() => Shared::MtFiles,
+        // The one file is meant to be read, whatever its name.
+        _ => Shared::All,
+    };
+    let router = with_headers(router, arguments.cache, shared, arguments.cors.as_deref())?;
+    listen(router, &arguments.host, &[arguments.port], |address| announce(address, &path))
+}
+
+/// Answers on the first of `ports` that is free, until Ctrl-C; says when it has begun.
+pub fn listen(
+    router: Router,
+    host: &str,
+    ports: &[u16],
+    begun: impl FnOnce(SocketAddr) -> Result<()>,
+) -> Result<()> {
     let stop = stop_on_interrupt()?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let served = runtime.block_on(async {
-        let Arguments { host, port, .. } = arguments;
-        let listener = TcpListener::bind((host.as_str(), *port)).await.with_context(|| {
-            format!("{host}:{port} cannot be listened on; choose another --port, or 0 for any that is free")
-        })?;
+        let listener = bind(host, ports).await?;
         let address = listener.local_addr()?;
         let names = Names::of(host, address.ip());
         let router = router.layer(middleware::from_fn(move |request: Request, next: Next| {
             let known = names.include(&request);
             async move { if known { next.run(request).await } else { misdirected() } }
         }));
-        announce(address, &path)?;
+        begun(address)?;
         connections::serve(listener, router, stop).await;
         Ok(())
     });
     // A file that is being read from a slow disk does not hold up the end.
     runtime.shutdown_background();
     served
+}
+
+async fn bind(host: &str, ports: &[u16]) -> Result<TcpListener> {
+    let mut result = Err(std::io::ErrorKind::AddrNotAvailable.into());
+    let mut tried = 0;
+    for &port in ports {
+        (result, tried) = (TcpListener::bind((host, port)).await, port);
+        if result.is_ok() {
+            break;
+        }
+    }
+    result.with_context(|| {
+        format!("{host}:{tried} cannot be listened on; choose another --port, or 0 for any that is free")
+    })
 }
 
 /// What answers, and the path at which it does.
@@ -121,7 +148,7 @@ fn router(arguments: &Arguments) -> Result<(Router, String)> {
 }
 
 /// The files in the folder at `path`, below the address `at`.
-fn folder(at: &str, path: &Path) -> Result<Router> {
+pub fn folder(at: &str, path: &Path) -> Result<Router> {
     let root = path.canonicalize().with_context(|| path.display().to_string())?;
     let files = ServeDir::new(&root).redirect_path_prefix(at);
     let guard = middleware::from_fn(move |request: Request, next: Next| {
@@ -166,27 +193,22 @@ fn file(path: &Path) -> Result<(Router, String)> {
     Ok((Router::new().fallback_service(file).layer(guard), at))
 }
 
-fn with_status(status: StatusCode) -> Response {
+pub fn with_status(status: StatusCode) -> Response {
     let mut response = Response::default();
     *response.status_mut() = status;
     response
 }
 
-fn with_headers(router: Router, arguments: &Arguments) -> Result<Router> {
-    let caching = match arguments.cache {
+/// Puts on all answers what does not depend on the file: how long copies may be used (in seconds), and what pages of other origins may read.
+pub fn with_headers(router: Router, cache: u32, shared: Shared, origin: Option<&str>) -> Result<Router> {
+    let caching = match cache {
         0 => HeaderValue::from_static("no-cache"),
         seconds => HeaderValue::try_from(format!("public, max-age={seconds}"))?,
     };
     let router = router.layer(middleware::from_fn(ranges)).layer(middleware::from_fn(throttle));
-    let router = match arguments.cors.as_deref() {
-        Some("none") => router,
-        chosen => router.layer(cors(chosen.unwrap_or("*"))?),
-    };
-    // The one file is meant to be read, whatever its name.
-    let shared = match arguments.cors.as_deref() {
-        Some("none") => Shared::Nothing,
-        None if arguments.path.is_dir() => Shared::MtFiles,
-        _ => Shared::All,
+    let router = match shared {
+        Shared::Nothing => router,
+        Shared::MtFiles | Shared::All => router.layer(cors(origin.unwrap_or("*"))?),
     };
     Ok(router.layer(middleware::from_fn(move |request: Request, next: Next| {
         let (caching, shared) = (caching.clone(), shared.has(request.uri().path()));
@@ -200,7 +222,7 @@ fn with_headers(router: Router, arguments: &Arguments) -> Result<Router> {
 
 /// What pages of other origins may read.
 #[derive(Clone, Copy)]
-enum Shared {
+pub enum Shared {
     Nothing,
     MtFiles,
     All,

@@ -17,3 +17,4 @@ mod repair;
 mod serve;
 mod support;
 mod surfaces;
+mod view;
