@@ -35,7 +35,12 @@ const NAMED = ["html", "js", "json", "nginx", "text", "xml", "yaml"];
  * @type {Record<string, string[]>}
  */
 const ELSEWHERE = {
-  "README.md": ["html: e2e.test.js", "js: parts.test.js", "rust: a documentation test of the crate", "sh: the commands that run all tests"],
+  "README.md": [
+    "html: e2e.test.js",
+    "js: parts.test.js",
+    "rust: a documentation test of the crate",
+    "sh: the commands that run all tests; `release` of xtask compiles the command with the page, cli/tests/command/view.rs views",
+  ],
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
   "docs/hosting.md": ["sh: needs an account of S3"],
