@@ -19,6 +19,7 @@ mod fixture;
 mod fixture_builds;
 mod licences;
 mod package;
+mod pages;
 mod paper;
 mod planted;
 mod public_api;
@@ -42,6 +43,8 @@ usage: cargo xtask COMMAND
   demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
                                  volume is made in the background, unless with --small
   docs                           make the documentation's site in target/docs
+  pages [--small]                make the demo and the documentation's site as one folder of static files, target/pages;
+                                 with --small without the large volume
   test [STEP...]                 every check, or the named steps; `test --list` names them
   test --quick                   formatting, lints and native tests; not: documentation, the longest tests, real data,
                                  JavaScript, wasm, browsers
@@ -81,6 +84,7 @@ fn run() -> Result<()> {
         "build" => package::build(rest),
         "demo" => demo::run(rest),
         "docs" => docs::run(rest),
+        "pages" => pages::run(rest),
         "test" => suite::run(rest),
         "bench" => bench::run(rest),
         "paper" => paper::run(rest),

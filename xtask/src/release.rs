@@ -31,7 +31,9 @@ fn check_page() -> Result<()> {
     let program = shell::command_with_page()?;
     println!("{}: {} bytes", program.display(), fs::metadata(&program)?.len());
     let server = Server::of(shell::command(&program, ["view", "--no-browser", "--port", "0"]))?;
-    for (path, file) in [("", "www/index.html"), ("pkg/tetralod_viewer_bg.wasm", "pkg/tetralod_viewer_bg.wasm")] {
+    for (path, file) in
+        [("", "www/index.html"), ("pkg/tetralod_viewer_bg.wasm", "pkg/tetralod_viewer_bg.wasm")]
+    {
         ensure!(server.get(path)? == fs::read(file)?, "`tetralod view` does not serve {file}");
     }
     Ok(())
