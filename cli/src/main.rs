@@ -6,6 +6,7 @@
 
 mod bench;
 mod build;
+mod completions;
 mod convert;
 mod deform;
 mod extract;
@@ -73,6 +74,7 @@ enum Command {
     Bench(bench::Arguments),
     Serve(serve::Arguments),
     View(view::Arguments),
+    Completions(completions::Arguments),
 }
 
 /// Lets glibc give freed memory back: by default it keeps some in an arena for each thread, and takes large arrays from the heap once one
@@ -126,6 +128,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Render(arguments) => render::run(&arguments)?,
         Command::Serve(arguments) => serve::run(&arguments)?,
         Command::View(arguments) => view::run(&arguments)?,
+        Command::Completions(arguments) => completions::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -910,3 +910,24 @@ fn an_interrupt_leaves_what_was_there() {
     assert_eq!(folder.names(), ["b.mt", "b.vti", "big.vtu"]);
     assert_eq!(fs::read(Path::new(&mt)).expect("it is there"), b"old");
 }
+
+#[test]
+fn shells_get_completions_and_manual_pages() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = good(&["completions", shell]);
+        assert!(
+            ["cell-to-point", "streamlines", "no-browser"].iter().all(|word| script.contains(word)),
+            "{shell}"
+        );
+    }
+    let folder = Folder::new("manual");
+    good(&["completions", "--man", &folder.path("")]);
+    let names = folder.names();
+    for name in ["tetralod.1", "tetralod-build.1", "tetralod-view.1"] {
+        assert!(names.iter().any(|found| found == name), "{names:?}");
+    }
+    let page = std::fs::read_to_string(folder.path("tetralod-view.1")).expect("a page");
+    assert!(page.starts_with(".ie") && page.contains("Shows volumes in the browser"), "{page}");
+    bad(2, &["completions"], &["SHELL"]);
+    bad(1, &["completions", "--man", &folder.path("none")], &["none"]);
+}
