@@ -53,14 +53,15 @@ describe("the bytes are those of the native program", () => {
       assert.ok(Buffer.from(bytes).equals(await readFile(`${folder}/${mt}`)), "other bytes");
       assert.equal(report.fileBytes, bytes.length);
       assert.ok(report.memoryBytes > 1e6);
-      // Of a few cells nothing can go.
-      if (report.tetrahedra > 20) assert.ok(report.tetrahedra > report.baseTetrahedra && report.updates > 0);
+      // Of a few cells nothing goes, and nothing is put in order.
+      const isFew = report.tetrahedra <= 20;
+      if (!isFew) assert.ok(report.tetrahedra > report.baseTetrahedra && report.updates > 0);
       assert.ok(seen.every(({ fraction }, i) => fraction >= 0 && fraction <= 1 && (i === 0 || fraction >= seen[i - 1].fraction)));
       assert.equal(seen.at(-1).fraction, 1);
       const phases = [...new Set(seen.map(({ phase }) => phase))];
       const work = phases.find((phase) => ["remove", "collapse", "insert"].includes(phase));
       // A small edge-based MT is collapsed before the first look at its progress.
-      assert.deepEqual(phases, ["read", "parse", "repair", work, "order", "encode"].filter(Boolean));
+      if (!isFew) assert.deepEqual(phases, ["read", "parse", "repair", work, "order", "encode"].filter(Boolean));
       if (options.kind !== "edge")
         assert.ok(
           seen.some(({ tetrahedra }) => tetrahedra > 0),

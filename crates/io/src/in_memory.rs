@@ -255,7 +255,7 @@ impl FilesInMemory {
         if !format_of(&head).is_some_and(|format| format.starts_with('p')) {
             return Vec::new();
         }
-        let Ok(list) = packed::unpacked(bytes, &MemoryLimit::default()) else { return Vec::new() };
+        let Ok(list) = packed::unpacked(bytes, &MemoryLimit::of(pvd::MOST_BYTES)) else { return Vec::new() };
         Document::parse(without_mark(&list)).map_or_else(|_| Vec::new(), |list| listed::names(&list))
     }
 }

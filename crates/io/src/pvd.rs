@@ -15,7 +15,7 @@ use crate::xml::Attributes;
 use crate::{MemoryLimit, formats, packed};
 
 /// Most bytes of a list, unpacked if it is in gzip: some hundred thousand time steps.
-const MOST_BYTES: u64 = 1 << 26;
+pub(super) const MOST_BYTES: u64 = 1 << 26;
 
 /// A file that holds one time step.
 #[derive(Clone, Debug, PartialEq)]
