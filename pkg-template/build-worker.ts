@@ -12,15 +12,9 @@ import { VERSION } from "./version.js";
 const PAUSE = 50;
 
 /** A file, and its name where its source has none that is sent along. */
-interface File {
+export interface InputFile {
   source: Source;
   name?: string;
-}
-
-/** The files of a time step: one, or raw samples and the JSON beside them. */
-export interface Step {
-  data: File;
-  sidecar?: File;
 }
 
 /** The message of the panic that ended the module, if there was one. */
@@ -50,50 +44,29 @@ const megabytes = (bytes: number) => bytes / 2 ** 20;
 /** Hears of the progress, and never ends the work. */
 type Report = (phase: BuildPhase, done: number, total: number, tetrahedra?: number) => boolean;
 
-/** Copies the files of all time steps into the module. */
-async function read(builder: MeshBuilder, steps: Step[], report: Report) {
-  const opened: { data: OpenSource; sidecar: OpenSource | undefined }[] = [];
-  for (const { data, sidecar } of steps) {
-    opened.push({ data: await open(data), sidecar: sidecar && (await open(sidecar)) });
-  }
-  const total = opened.reduce((sum, { data }) => sum + (data.total ?? 0), 0);
+/** Copies all files into the module. */
+async function read(builder: MeshBuilder, files: InputFile[], report: Report) {
+  const opened: OpenSource[] = [];
+  for (const file of files) opened.push(await open(file));
+  const total = opened.reduce((sum, file) => sum + (file.total ?? 0), 0);
   let done = 0;
-  for (const { data, sidecar } of opened) {
-    builder.addFile(data.name, data.total ?? 0);
-    for await (const bytes of chunksOf(data)) {
+  for (const file of opened) {
+    builder.addFile(file.name, file.total ?? 0);
+    for await (const bytes of chunksOf(file)) {
       builder.append(bytes);
       done += bytes.length;
       report("read", megabytes(done), megabytes(Math.max(total, done)));
     }
-    if (sidecar) builder.addSidecar(sidecar.name, await whole(sidecar));
   }
 }
 
-async function open({ source, name }: File): Promise<OpenSource> {
+async function open({ source, name }: InputFile): Promise<OpenSource> {
   const opened = await openSource(source);
   return { ...opened, name: name || opened.name };
 }
 
 async function* chunksOf({ chunks }: OpenSource) {
   for (let part = await chunks.next(); !part.done; part = await chunks.next()) yield part.value;
-}
-
-/** All bytes of a small file. */
-async function whole(file: OpenSource): Promise<Uint8Array> {
-  const parts: Uint8Array[] = [];
-  let length = 0;
-  for await (const bytes of chunksOf(file)) {
-    parts.push(bytes);
-    length += bytes.length;
-    if (length > 2 ** 20) throw new TetralodError("corrupt", `${file.name}: this is too long for the description of raw samples`);
-  }
-  const all = new Uint8Array(length);
-  let at = 0;
-  for (const part of parts) {
-    all.set(part, at);
-    at += part.length;
-  }
-  return all;
 }
 
 /** Emits the progress, not more often than a person can see it. */
@@ -110,10 +83,10 @@ function reporter(): Report {
 }
 
 /** One call of the builder with the files in it. */
-function withFiles<T>(steps: Step[], memory: number | undefined, report: Report, work: (builder: MeshBuilder) => T): Promise<T> {
+function withFiles<T>(files: InputFile[], memory: number | undefined, report: Report, work: (builder: MeshBuilder) => T): Promise<T> {
   return guarded(async () => {
     const builder = new MeshBuilder((message: string) => (panic = message), memory);
-    await read(builder, steps, report);
+    await read(builder, files, report);
     return work(builder);
   });
 }
@@ -126,12 +99,12 @@ const methods = {
       .catch((error) => Promise.reject(wasmError(error, "tetralod/build.wasm")));
     return { name: "build", version: VERSION };
   },
-  inspect: (steps: Step[], options: CoreBuildOptions, memory?: number): Promise<InputInfo> =>
-    withFiles(steps, memory, () => false, (builder) => builder.inspect(options)),
-  async build(steps: Step[], options: CoreBuildOptions, memory?: number): Promise<{ bytes: Uint8Array<ArrayBuffer>; report: BuildReport }> {
+  inspect: (files: InputFile[], options: CoreBuildOptions, memory?: number): Promise<InputInfo> =>
+    withFiles(files, memory, () => false, (builder) => builder.inspect(options)),
+  async build(files: InputFile[], options: CoreBuildOptions, memory?: number): Promise<{ bytes: Uint8Array<ArrayBuffer>; report: BuildReport }> {
     const start = performance.now();
     const report = reporter();
-    return withFiles(steps, memory, report, (builder) => {
+    return withFiles(files, memory, report, (builder) => {
       const built = builder.build(options, report);
       const seconds = (performance.now() - start) / 1000;
       return { bytes: built.bytes, report: { ...built.report, fileBytes: built.bytes.length, seconds, memoryBytes: memoryBytes() } };

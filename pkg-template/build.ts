@@ -13,7 +13,7 @@
  * ```
  */
 
-import type { BuildMethods, Step } from "./build-worker.js";
+import type { BuildMethods, InputFile } from "./build-worker.js";
 import { type ErrorCode, TetralodError, badOption, known } from "./errors.js";
 import type { Averaged, Extremes } from "./results.js";
 import { type Kind, absoluteHref, checkWorker, startWorker } from "./start.js";
@@ -24,12 +24,22 @@ export { TetralodError, type ErrorCode };
 /** The content of a file. Bytes in memory are copied, not taken away. */
 export type FileSource = Blob | ArrayBuffer | ArrayBufferView | URL | string;
 
-/** The file of a mesh; of raw samples two. */
-export type MeshFile = FileSource | { raw: FileSource; json: FileSource };
+/**
+ * A file under a name, by which others name it, perhaps with folders: `case/0.vtu`. A `File` has a name of its own, and a URL its path;
+ * bytes have none.
+ */
+export interface NamedFile {
+  name: string;
+  data: FileSource;
+}
+
+/** A file of a mesh; of raw samples two that belong together whatever they are called. */
+export type MeshFile = FileSource | NamedFile | { raw: FileSource; json: FileSource };
 
 /**
- * What an MT is built of: a file (`.vtu`, `.vti`, `.vtk`, or raw samples with the JSON beside them), or a list of files, which are
- * time steps over one mesh. In a list, `x.raw` and `x.json` are one.
+ * What an MT is built of: a file of any format that the command reads, or a list of files. What one of them names belongs to it: the
+ * pieces of a `.pvtu`, the samples of a `.nhdr` or `.mhd`, the files of a `.pvd`, and of one name `.node` and `.ele`, `.mesh` and `.sol`,
+ * `.raw` and `.json`. All others are time steps over one mesh, in the order of the list.
  */
 export type MeshSource = MeshFile | readonly MeshFile[];
 
@@ -97,10 +107,32 @@ export interface InputField {
   vector: { name: string; component: number | undefined } | undefined;
 }
 
+/** A format of meshes: VTK's, also with the pieces in several files and in HDF5, Exodus II, those of meshers and of images, and raw samples. */
+export type InputFormat =
+  | "vtu"
+  | "vti"
+  | "vtr"
+  | "vts"
+  | "vtk"
+  | "pvtu"
+  | "pvti"
+  | "pvtr"
+  | "pvts"
+  | "vtkhdf"
+  | "exodus"
+  | "gmsh"
+  | "medit"
+  | "tetgen"
+  | "netgen"
+  | "nrrd"
+  | "metaimage"
+  | "raw";
+
 /** What is in the files of a mesh. */
 export interface InputInfo {
-  /** The format, by content: VTK XML unstructured grid or image data, legacy VTK, or raw samples. */
-  format: "vtu" | "vti" | "vtk" | "raw";
+  /** The format, by content. */
+  format: InputFormat;
+  /** Points; of a mesh in pieces, those that several pieces have count in each. */
   points: number;
   /** Cells; of a grid the tetrahedra that it is split into. */
   tetrahedra: number;
@@ -242,7 +274,7 @@ export interface AveragedField extends Averaged {
   points: Extremes;
 }
 
-const KINDS = "give a File, Blob, ArrayBuffer, Uint8Array, URL, { raw, json }, or a list of these for time steps";
+const KINDS = "give a File, Blob, ArrayBuffer, Uint8Array, URL, { name, data }, { raw, json }, or a list of these";
 
 const BUILDER: Kind = {
   name: "build",
@@ -285,7 +317,8 @@ export async function build(source: MeshSource, options: BuildOptions = {}): Pro
 }
 
 /**
- * What is in the files of a mesh, before it is built: nothing is decoded but the points, for their bounds.
+ * What is in the files of a mesh, before it is built: nothing is decoded but the points, for their bounds, and cells where only these say
+ * how many there are.
  *
  * @throws {TetralodError} as {@link build}, as far as that is seen from the structure of the files and from the cells
  */
@@ -303,14 +336,14 @@ async function inWorker<Method extends "build" | "inspect">(
   signal?.throwIfAborted();
   if (memory !== undefined && !(memory >= 0)) throw badOption("memory", "must be a number that is not negative");
   const wasm = absoluteHref("wasmUrl", wasmUrl);
-  const steps = await stepsOf(source);
+  const files = await filesOf(source);
   signal?.throwIfAborted();
   const remote = startWorker<BuildMethods>(BUILDER, { workerUrl, workerTimeoutMs }, onEvent);
   const onAbort = () => remote.close(signal?.reason);
   signal?.addEventListener("abort", onAbort, { once: true });
   try {
     await checkWorker(BUILDER, remote.call("load", [wasm]));
-    return await remote.call(method, [steps, options, memory] as unknown as Parameters<BuildMethods[Method]>);
+    return await remote.call(method, [files, options, memory] as unknown as Parameters<BuildMethods[Method]>);
   } catch (error) {
     if (known(error).name === "DataCloneError") throw badOption("options", "must be plain data");
     throw error;
@@ -320,55 +353,58 @@ async function inWorker<Method extends "build" | "inspect">(
   }
 }
 
-/** The files of each time step, as they can be sent to a worker. */
-async function stepsOf(source: MeshSource): Promise<Step[]> {
-  const steps = await Promise.all(Array.isArray(source) ? pairs(source).map(stepOf) : [stepOf(source as MeshFile)]);
-  if (steps.length === 0) throw new TetralodError("bad-source", `there is no file; ${KINDS}`);
-  return steps;
+/** All files, as they can be sent to a worker. */
+async function filesOf(source: MeshSource): Promise<InputFile[]> {
+  const list: readonly MeshFile[] = Array.isArray(source) ? source : [source as MeshFile];
+  const files = (await Promise.all(list.map(filesIn))).flat();
+  if (files.length === 0) throw new TetralodError("bad-source", `there is no file; ${KINDS}`);
+  return files;
 }
 
-async function stepOf(source: MeshFile): Promise<Step> {
-  const { raw, json } = (source ?? {}) as { raw?: FileSource; json?: FileSource };
-  if (raw === undefined && json === undefined) return { data: await sendable(source as FileSource) };
+async function filesIn(source: MeshFile, number: number): Promise<InputFile[]> {
+  const { raw, json, data, name } = (source ?? {}) as Partial<NamedFile & { raw: FileSource; json: FileSource }>;
+  if (data !== undefined) return [{ ...(await sendable(data)), name }];
+  if (raw === undefined && json === undefined) return [await sendable(source as FileSource)];
   if (raw === undefined || json === undefined) {
     throw new TetralodError("bad-source", "raw samples are two files: give { raw, json }");
   }
-  return { data: await sendable(raw), sidecar: await sendable(json) };
-}
-
-/** Samples and the JSON beside them, which are one step, among files that were dropped together. */
-function pairs(files: readonly MeshFile[]): MeshFile[] {
-  const stem = (file: MeshFile, ending: string) => {
-    const { name } = (file ?? {}) as { name?: string };
-    return name?.toLowerCase().endsWith(ending) ? name.slice(0, -ending.length) : undefined;
-  };
-  const sidecars = new Map(files.map((file) => [stem(file, ".json"), file as FileSource]));
-  sidecars.delete(undefined);
-  const used = new Set<MeshFile>();
-  const joined = files.map((file) => {
-    const json = sidecars.get(stem(file, ".raw"));
-    if (json) used.add(json);
-    return json ? { raw: file as FileSource, json } : file;
-  });
-  return joined.filter((file) => !used.has(file));
+  const [samples, sidecar] = await Promise.all([sendable(raw), sendable(json)]);
+  const stem = (sidecar.name ?? samples.name ?? `samples-${number}`).replace(/\.[^./]*$/, "");
+  return [
+    { ...samples, name: `${stem}.raw` },
+    { ...sidecar, name: `${stem}.json` },
+  ];
 }
 
 /** A source that a worker can read, and its name, which not every runtime sends along. */
-async function sendable(source: FileSource): Promise<Step["data"]> {
+async function sendable(source: FileSource): Promise<InputFile> {
   if (typeof Blob === "function" && source instanceof Blob) {
-    const { name } = source as { name?: string };
+    const { name, webkitRelativePath } = source as Partial<File>;
     // Node 20 crashes when a worker reads a Blob that is backed by a file.
-    return { source: nodeModule("node:worker_threads") ? await source.arrayBuffer() : source, name };
+    return { source: nodeModule("node:worker_threads") ? await source.arrayBuffer() : source, name: webkitRelativePath || name };
   }
   if (source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return { source };
-  if (typeof source === "string" || source instanceof URL) return { source: absolute(source) };
+  if (typeof source === "string" || source instanceof URL) {
+    const url = absolute(source);
+    return { source: url.href, name: pathOf(url) };
+  }
   throw new TetralodError("bad-source", `this cannot be read; ${KINDS}`);
 }
 
-function absolute(url: string | URL): string {
+function absolute(url: string | URL): URL {
   try {
-    return new URL(url, globalThis.location?.href).href;
+    return new URL(url, globalThis.location?.href);
   } catch {
     throw new TetralodError("bad-source", `${url}: this is no URL; ${KINDS}`);
+  }
+}
+
+/** A URL as files name it: without what is not of its path, and with all characters as they are. */
+function pathOf({ protocol, host, pathname }: URL): string | undefined {
+  if (!/^(https?|file):$/.test(protocol)) return undefined;
+  try {
+    return `${protocol}//${host}${decodeURIComponent(pathname)}`;
+  } catch {
+    return `${protocol}//${host}${pathname}`;
   }
 }

@@ -2,11 +2,9 @@
 
 import { element } from "./dom.js";
 import { count, nameOf, size } from "./format.js";
+import { mainOf } from "./source.js";
 import { averagedWords } from "./averaged.js";
 import { RepairControls, repairWords } from "./repair.js";
-
-/** Names of files that an MT can be built of. */
-const MESH = /\.(vtu|vti|vts|vtr|vtk|raw|json)$/i;
 
 /** What the phases of the work are called. @type {Record<string, string>} */
 const PHASES = {
@@ -32,16 +30,14 @@ const AT_CELLS =
 let shown;
 
 /**
- * Takes `files` if they are a mesh, not an MT file: then true. `open` gets the MT file that is built of them.
+ * Shows the dialog for `files`, which are a mesh. `open` gets the MT file that is built of them.
  *
- * @param {File[]} files
+ * @param {import("./source.js").Dropped[]} files
  * @param {(file: File) => unknown} open
  */
 export function takeMesh(files, open) {
-  if (!files.some(({ name }) => MESH.test(name))) return false;
   shown?.close();
   shown = new BuildDialog(files, open);
-  return true;
 }
 
 class BuildDialog {
@@ -67,11 +63,11 @@ class BuildDialog {
   #cancel = element("button", { type: "button", textContent: "Cancel" });
   #dialog = element("dialog", { className: "build" });
 
-  /** @param {File[]} files @param {(file: File) => unknown} open */
+  /** @param {import("./source.js").Dropped[]} files @param {(file: File) => unknown} open */
   constructor(files, open) {
     this.#files = files;
     this.#open = open;
-    this.#name = nameOf(files.find(({ name }) => !/\.json$/i.test(name)) ?? files[0]);
+    this.#name = nameOf(mainOf(files).name);
     const title = element("h2", { textContent: `Build an MT file of ${this.#name}` });
     title.id = "build-title";
     this.#dialog.setAttribute("aria-labelledby", title.id);
@@ -205,7 +201,7 @@ class BuildDialog {
       const onProgress = (/** @type {import("tetralod/build").BuildProgress} */ progress) => this.#showProgress(progress);
       const { bytes, report } = await build(this.#files, { ...options, onProgress });
       this.#setBusy(false);
-      this.#finish(new File([bytes], `${this.#name.replace(MESH, "")}.mt`), report);
+      this.#finish(new File([bytes], `${this.#name.replace(/(\.[^.]+)(\.gz)?$/i, "")}.mt`), report);
     } catch (/** @type {any} */ error) {
       this.#setBusy(false);
       this.#status.textContent = "";

@@ -8,44 +8,62 @@ import { open, openBuilt } from "./opening.js";
 /** How an MT file begins. */
 const START = [0x89, 0x54, 0x4c, 0x4f, 0x44, 0x0d, 0x0a, 0x1a];
 
-/** Names of files that the command reads, and the page does not. */
-const FOR_COMMAND = /\.(pv(?:d|t[uirs])|vtkhdf|hdf|hdf5|h5|exo|ex2|e|msh|meshb?|solb?|node|ele|vol|nrrd|nhdr|mha|mhd)$/i;
+/** @typedef {import("./source.js").Dropped} Dropped */
 
-const READ_HERE = "This page opens .mt files, and builds them of .vtu, .vti, .vts, .vtr, .vtk, and .raw with its .json";
-const READ_BY_COMMAND = "VTKHDF, Exodus II, lists of files (.pvtu, .pvd), Gmsh, Medit, TetGen, Netgen, NRRD and MetaImage";
-
-/** Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of. @param {File[]} files */
+/** Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of. @param {Dropped[]} files */
 export async function takeFiles(files) {
   if (files.length === 0) return;
   dialog("gallery").close();
-  if (takeMesh(files, (built) => openBuilt(built, files))) return;
-  const [file] = files;
-  // An empty file, and one that cannot be read, are for whoever opens them.
-  const start = new Uint8Array(
-    await file
-      .slice(0, START.length)
-      .arrayBuffer()
-      .catch(() => new ArrayBuffer(0)),
-  );
-  const isOther = start.some((byte, i) => byte !== START[i]);
-  if (isOther && !/\.mt$/i.test(file.name)) return say("This page does not read the file", { message: wordsFor(file.name) });
-  open(file);
+  const [{ data }] = files;
+  const isMt = files.every(({ name }) => /\.mt$/i.test(name)) || (files.length === 1 && (await beginsAsMt(data)));
+  if (isMt) open(data);
+  else takeMesh(files, (built) => openBuilt(built, files));
 }
 
-/** What to do with a file that the page does not read. @param {string} name */
-function wordsFor(name) {
-  const [stem] = name.split(/\.[^.]*$/);
-  const known = `${READ_HERE}. The command reads this one: tetralod build ${quoted(name)} -o ${quoted(`${stem}.mt`)}`;
-  return `${name}: ${FOR_COMMAND.test(name) ? known : `${READ_HERE}. The command "tetralod build" also reads ${READ_BY_COMMAND}`}`;
+/** Whether the content says that it is an MT file. One that cannot be read is for whoever opens it. @param {File} file */
+async function beginsAsMt(file) {
+  const start = await file
+    .slice(0, START.length)
+    .arrayBuffer()
+    .catch(() => new ArrayBuffer(0));
+  const bytes = new Uint8Array(start);
+  return START.every((byte, i) => byte === bytes[i]);
 }
 
-/** As a shell takes it. */
-const quoted = (/** @type {string} */ name) => (/^[\w.+-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`);
+/** @param {Iterable<File> | null | undefined} files @returns {Dropped[]} */
+const named = (files) => Array.from(files ?? [], (data) => ({ name: data.webkitRelativePath || data.name, data }));
+
+/** What was dropped, with all files of folders by their names; hidden ones nobody means. @param {DataTransfer} transfer @returns {Promise<Dropped[]>} */
+async function droppedFiles(transfer) {
+  // Both are empty when the event is over.
+  const files = named(transfer.files);
+  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.());
+  if (!entries.some((entry) => entry?.isDirectory)) return files;
+  const all = (await Promise.all(entries.map(filesIn))).flat();
+  const { compare } = new Intl.Collator("en", { numeric: true });
+  return all.filter(({ name }) => !/(^|\/)\./.test(name)).sort((a, b) => compare(a.name, b.name));
+}
+
+/** @param {FileSystemEntry | null | undefined} entry @returns {Promise<Dropped[]>} */
+async function filesIn(entry) {
+  const path = entry?.fullPath.replace(/^\//, "") ?? "";
+  if (entry?.isFile) return [{ name: path, data: await new Promise((resolve, reject) => /** @type {FileSystemFileEntry} */ (entry).file(resolve, reject)) }];
+  if (!entry?.isDirectory) return [];
+  const reader = /** @type {FileSystemDirectoryEntry} */ (entry).createReader();
+  const found = [];
+  for (;;) {
+    /** @type {FileSystemEntry[]} */
+    const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+    if (some.length === 0) break;
+    found.push(...(await Promise.all(some.map(filesIn))).flat());
+  }
+  return found;
+}
 
 export function attachFiles() {
   $("choose").addEventListener("click", () => input("file").click());
   input("file").addEventListener("change", () => {
-    const files = [...(input("file").files ?? [])];
+    const files = named(input("file").files);
     input("file").value = "";
     takeFiles(files);
   });
@@ -62,6 +80,7 @@ export function attachFiles() {
     $("drop").hidden = true;
     if (!carriesFile(event)) return;
     event.preventDefault();
-    takeFiles([...(event.dataTransfer?.files ?? [])]);
+    const files = event.dataTransfer ? droppedFiles(event.dataTransfer) : Promise.resolve([]);
+    files.then(takeFiles).catch((error) => say("What was dropped cannot be read", error));
   });
 }

@@ -33,7 +33,7 @@ let opened = () => {};
 /** @param {typeof opened} then is called when a volume is complete */
 export const onOpened = (then) => void (opened = then);
 
-/** Opens an MT file that the page has built of files of the user. @param {File} built @param {File[]} files */
+/** Opens an MT file that the page has built of files of the user. @param {File} built @param {import("./source.js").Dropped[]} files */
 export function openBuilt(built, files) {
   setOrigin(built, files);
   return open(built);

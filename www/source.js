@@ -19,11 +19,19 @@ const files = new Map();
 /** What MT files were built of by the page: in words, and its bytes. @type {WeakMap<File, { format: string, bytes: number }>} */
 const origins = new WeakMap();
 
-/** Notes what the page has built of files of the user. @param {File} built @param {File[]} files */
+/** A file of the user with its folders, as others may name it. @typedef {{ name: string, data: File }} Dropped */
+
+/** Files that name others, and those that go with others. */
+const LISTS = /\.(pvd|pvt[uirs]|nhdr|mhd)(\.gz)?$/i;
+const PARTS = /\.(json|ele|face|edge|neigh|solb?)$/i;
+
+/** The file that a mesh is called by. @param {Dropped[]} files */
+export const mainOf = (files) => files.find(({ name }) => LISTS.test(name)) ?? files.find(({ name }) => !PARTS.test(name)) ?? files[0];
+
+/** Notes what the page has built of files of the user. @param {File} built @param {Dropped[]} files */
 export function setOrigin(built, files) {
-  const data = files.find(({ name }) => !/\.json$/i.test(name)) ?? files[0];
-  const format = (data.name.split(".").pop() ?? "").toUpperCase();
-  origins.set(built, { format, bytes: files.reduce((sum, { size }) => sum + size, 0) });
+  const [ending = ""] = mainOf(files).name.replace(/\.gz$/i, "").split(".").reverse();
+  origins.set(built, { format: ending.toUpperCase(), bytes: files.reduce((sum, { data }) => sum + data.size, 0) });
 }
 
 /** What the volume was built of, if the page has built it. */

@@ -265,19 +265,24 @@ pub const NAMES: [&str; 32] = [
     "sub/a.vtu",
 ];
 
-/// Files in a folder: for each its number in [`NAMES`], its length in two bytes, and its content.
+/// Files in a folder, and in memory: for each its number in [`NAMES`], its length in two bytes, and its content.
 pub fn folder(input: &[u8]) {
     let folder = Folder::new();
-    let (mut rest, mut first) = (input, None);
+    let (mut rest, mut first, mut in_memory) = (input, None, io::FilesInMemory::default());
     while let [number, low, high, content @ ..] = rest {
         let name = NAMES[usize::from(*number) % NAMES.len()];
         let length = usize::from(u16::from_le_bytes([*low, *high])).min(content.len());
         let path = folder.put(name, &content[..length]);
+        in_memory.add(name, &content[..length]);
         first = first.or(Some(path));
         rest = &content[length..];
     }
     if let Some(path) = first {
         read_by_path(&path);
+    }
+    for step in in_memory.steps().unwrap_or_default().iter().take(3) {
+        let _ = in_memory.survey(step, &io::MemoryLimit::of(MEMORY));
+        let _ = in_memory.read(step, &options(0));
     }
 }
 
@@ -288,14 +293,17 @@ pub fn hdf5(input: &[u8]) {
     let _ = io::survey("a.vtkhdf", input);
 }
 
-/// Reads some of the steps that a file stands for, and its pieces if it has some.
-fn read_by_path(path: &Path) {
-    let options = |step: usize| io::ReadOptions {
+fn options(step: usize) -> io::ReadOptions {
+    io::ReadOptions {
         cells: io::CellData::Values,
         memory: io::MemoryLimit::of(MEMORY),
         step,
         ..io::ReadOptions::default()
-    };
+    }
+}
+
+/// Reads some of the steps that a file stands for, and its pieces if it has some.
+fn read_by_path(path: &Path) {
     for step in io::steps(path).unwrap_or_default().iter().take(3) {
         let _ = io::read_with(&step.path, &options(step.number));
     }

@@ -18,11 +18,10 @@ const read = async (name) => new Uint8Array(await readFile(`${folder}/${name}`))
 const file = async (name) => new File([await read(name)], name);
 const cases = JSON.parse(await readFile(`${folder}/builds.json`, "utf8"));
 
-/** The files of a step of a case; raw samples are two. */
-async function input(names) {
-  const steps = names.map(async (name) => (name.endsWith(".raw") ? { raw: await file(name), json: await file(name.replace(".raw", ".json")) } : file(name)));
-  return steps.length === 1 ? steps[0] : Promise.all(steps);
-}
+/** Raw samples and the JSON beside them. */
+const samples = async (name) => ({ raw: await file(`${name}.raw`), json: await file(`${name}.json`) });
+/** Files under their names, which may have a folder. */
+const named = (names) => Promise.all(names.map(async (name) => ({ name, data: await file(name) })));
 
 /** All workers that were started and have not ended. */
 const alive = new Set();
@@ -46,19 +45,23 @@ async function noneAlive() {
 
 describe("the bytes are those of the native program", () => {
   assert.ok(cases.length >= 10);
-  for (const { inputs, options, mt } of cases) {
+  for (const { inputs, files, options, mt } of cases) {
     test(`${inputs} ${JSON.stringify(options)}`, async () => {
       const seen = [];
-      const { bytes, report } = await build(await input(inputs), { ...options, onProgress: (p) => seen.push(p) });
+      const source = files.length === 1 ? await file(files[0]) : await named(files);
+      const { bytes, report } = await build(source, { ...options, onProgress: (p) => seen.push(p) });
       assert.ok(Buffer.from(bytes).equals(await readFile(`${folder}/${mt}`)), "other bytes");
       assert.equal(report.fileBytes, bytes.length);
-      assert.ok(report.tetrahedra > report.baseTetrahedra && report.updates > 0 && report.memoryBytes > 1e6);
+      assert.ok(report.memoryBytes > 1e6);
+      // Of a few cells nothing goes, and nothing is put in order.
+      const isFew = report.tetrahedra <= 20;
+      if (!isFew) assert.ok(report.tetrahedra > report.baseTetrahedra && report.updates > 0);
       assert.ok(seen.every(({ fraction }, i) => fraction >= 0 && fraction <= 1 && (i === 0 || fraction >= seen[i - 1].fraction)));
       assert.equal(seen.at(-1).fraction, 1);
       const phases = [...new Set(seen.map(({ phase }) => phase))];
       const work = phases.find((phase) => ["remove", "collapse", "insert"].includes(phase));
       // A small edge-based MT is collapsed before the first look at its progress.
-      assert.deepEqual(phases, ["read", "parse", "repair", work, "order", "encode"].filter(Boolean));
+      if (!isFew) assert.deepEqual(phases, ["read", "parse", "repair", work, "order", "encode"].filter(Boolean));
       if (options.kind !== "edge")
         assert.ok(
           seen.some(({ tetrahedra }) => tetrahedra > 0),
@@ -168,7 +171,7 @@ test("files are inspected before they are built", async () => {
   const near = (a, b) => assert.ok(Math.abs(a - b) < 1e-3, `${a} is not ${b}`);
   [-4, -4, -4, 6, 4, 4].forEach((x, i) => near(bounds[i], x));
 
-  const raw = await inspect(await input(["grid.raw"]));
+  const raw = await inspect(await samples("grid"));
   assert.deepEqual([raw.format, raw.points, raw.bounds], ["raw", 120, [0, 0, 0, 5, 4, 6]]);
   assert.deepEqual([raw.fields[0].name, raw.fields[0].unit], ["density", "kg"]);
   const legacy = await inspect(await file("grid.vtk"));
@@ -207,12 +210,55 @@ test("every kind of source gives the same bytes and leaves the caller's alone", 
   assert.deepEqual(bytes, await read("grid.vtk"));
   // Two files that were dropped together.
   const pair = [await file("grid.json"), await file("grid.raw")];
-  assert.deepEqual((await build(pair)).bytes, (await build(await input(["grid.raw"]))).bytes);
+  const { raw, json } = await samples("grid");
+  const unnamed = { raw: await raw.arrayBuffer(), json: await json.arrayBuffer() };
+  for (const together of [await samples("grid"), unnamed]) assert.deepEqual((await build(pair)).bytes, (await build(together)).bytes);
   await rejects(build(/** @type {any} */ (7)), "bad-source", /File/);
   await rejects(build([]), "bad-source", /no file/);
   await rejects(build("no-url.vtu"), "bad-source", /no-url\.vtu/);
   await rejects(build(/** @type {any} */ ({ raw: bytes })), "bad-source", /raw, json/);
   await rejects(build(new URL("file:///no/such.vtu")), "network", /no\/such\.vtu/);
+});
+
+test("files belong together by what they name, under names, as URLs and without their folders", async () => {
+  const names = ["tets.pvtu", "tets/0.vtu", "tets/1.vtu"];
+  const { bytes } = await build(await named(names));
+  const urls = names.map((name) => pathToFileURL(`${folder}/${name}`));
+  const flat = names.map(async (name) => new File([await read(name)], name.replace(/.*\//, "")));
+  const alike = {
+    urls,
+    reversed: [...urls].reverse(),
+    flat: await Promise.all(flat),
+    deeper: (await named(names)).map(({ name, data }) => ({ name: `x/${name}`, data })),
+  };
+  for (const [what, source] of Object.entries(alike)) assert.deepEqual((await build(source)).bytes, bytes, what);
+  const { format, points, tetrahedra, fields, bounds } = await inspect(urls);
+  assert.deepEqual([format, points, tetrahedra, bounds], ["pvtu", 2 * 6 * 5 * 4, 6 * 5 * 4 * 3, [0, 0, 0, 5, 4, 3]]);
+  assert.deepEqual(
+    fields.map(({ name, at }) => [name, at]),
+    [["p", "points"]],
+  );
+  await rejects(build(urls.slice(0, 2)), "bad-source", /tets\.pvtu: piece 1: it needs the file "tets\/1\.vtu".*give them together/);
+  await rejects(build(urls[0]), "bad-source", /tets\/0\.vtu/);
+  await rejects(build([...urls, new File(["words"], "README.txt")]), "unknown-format", /README\.txt/);
+  const inFolder = [...(await named(names)), { name: "tets/README.txt", data: new Blob(["words"]) }];
+  const { bytes: same, report } = await build(inFolder);
+  assert.deepEqual([same, report.notes], [bytes, ["left out of the folder, for it is no mesh: tets/README.txt"]]);
+});
+
+test("every format is inspected", async () => {
+  const seen = {};
+  for (const { inputs, files } of cases) {
+    const { format, points, tetrahedra, bounds, fields } = await inspect(await named(files));
+    assert.ok(points > 0 && tetrahedra > 0 && fields.length > 0 && bounds.every(Number.isFinite), inputs[0]);
+    seen[inputs[0]] = format;
+  }
+  assert.deepEqual(
+    ["grid.nhdr", "grid.mhd", "tets.msh", "tets.node", "tets.mesh", "tets.vol", "tets.pvtu", "tets.pvd", "steps.vtkhdf", "netcdf4.exo"].map(
+      (name) => seen[name],
+    ),
+    ["nrrd", "metaimage", "gmsh", "tetgen", "medit", "netgen", "pvtu", "vtk", "vtkhdf", "exodus"],
+  );
 });
 
 test("a signal ends the work and its worker", async () => {
@@ -350,7 +396,7 @@ describe("broken files give typed errors", () => {
     await rejects(build(json('{"dims":[2,2,2],"type":"uint8"}')), "corrupt", /expected 8, found 120/);
     await rejects(build(json('{"dims":[4294967296,4294967296,4294967296],"type":"uint8"}')), "limit", /grid points/);
     await rejects(build(json('{"dims":[512,512,512],"type":"float64"}')), "memory", /MB/);
-    await rejects(build(json(" ".repeat(2 ** 21))), "corrupt", /too long/);
+    await rejects(build(json(" ".repeat(2 ** 21))), "corrupt", /grid\.json: not valid JSON/);
   });
 });
 

@@ -115,13 +115,12 @@ export const show = (page, view) => page.locator("label", { hasText: view }).fir
 /** Waits until the address has what a pattern matches. */
 export const addressed = (page, pattern) => page.waitForFunction((source) => new RegExp(source).test(location.hash), pattern.source, { timeout: PATIENCE });
 
-/** Drops a file on the page, as a person drags it there from a folder. */
-export const drop = (page, name, text) =>
-  page.evaluate(
-    ([name, text]) => {
-      const dataTransfer = new DataTransfer();
-      dataTransfer.items.add(new File([text], name));
-      for (const type of ["dragenter", "dragover", "drop"]) window.dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
-    },
-    [name, text],
-  );
+/** Drops files on the page, each with its name and text, as a person drags them there from a folder. */
+export const dropAll = (page, files) =>
+  page.evaluate((files) => {
+    const dataTransfer = new DataTransfer();
+    for (const [name, text] of files) dataTransfer.items.add(new File([text], name));
+    for (const type of ["dragenter", "dragover", "drop"]) window.dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
+  }, files);
+
+export const drop = (page, name, text) => dropAll(page, [[name, text]]);

@@ -1,8 +1,11 @@
 // Files that a person drops on the demo page: a mesh that is built there, a build that is cancelled, files that are broken.
 import assert from "node:assert/strict";
+import { mkdir, mkdtemp, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { assertDrawn, begin, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, still } from "./drive.js";
+import { assertDrawn, begin, differing, drop, dropAll, end, open, PATIENCE, picture, pictures, reach, setSlider, still } from "./drive.js";
 
 before(() => begin());
 
@@ -12,9 +15,9 @@ const screenshot = (page, name) => page.screenshot({ path: fileURLToPath(new URL
 
 /**
  * A VTU file of a grid of `n` cubes in each direction, each of six tetrahedra, with the distance to the middle as its field; or with a field at cells
- * alone, 1 but for cell `peak` with 1000.
+ * alone, 1 but for cell `peak` with 1000. It begins at `start` along x.
  */
-function gridFile(n, peak) {
+function gridFile(n, peak, start = 0) {
   const range = (count) => Array.from({ length: count }, (_, i) => i);
   const points = range((n + 1) ** 3).map((i) => [i % (n + 1), Math.floor(i / (n + 1)) % (n + 1), Math.floor(i / (n + 1) ** 2)]);
   const at = ([x, y, z]) => x + (n + 1) * (y + (n + 1) * z);
@@ -42,7 +45,12 @@ function gridFile(n, peak) {
   const data =
     peak === undefined ? `<PointData>${array("Float64", "distance", values)}</PointData>` : `<CellData>${array("Float64", "stress", stress)}</CellData>`;
   return `<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid><Piece NumberOfPoints="${points.length}" NumberOfCells="${cells.length}">
-${data}<Points>${array("Float64", "Points", points, 'NumberOfComponents="3"')}</Points>
+${data}<Points>${array(
+    "Float64",
+    "Points",
+    points.map(([x, y, z]) => [x + start, y, z]),
+    'NumberOfComponents="3"',
+  )}</Points>
 <Cells>${array("Int64", "connectivity", cells)}${array(
     "Int64",
     "offsets",
@@ -155,22 +163,99 @@ test("as many fields are ticked as memory has room for", async () => {
   await page.close();
 });
 
-test("files for the command are told so, and others what is read", async () => {
+/** A mesh in two pieces that meet, with the list of them first. */
+function inPieces(n) {
+  const names = ["case/0.vtu", "case/1.vtu"];
+  const sources = names.map((name) => `<Piece Source="${name}"/>`).join("");
+  const list = `<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid>${sources}</PUnstructuredGrid></VTKFile>`;
+  return [["case.pvtu", list], ...names.map((name, i) => [name, gridFile(n, undefined, i * n)])];
+}
+
+/** Drops files or folders of this machine, as a file manager does. */
+async function dropPaths(page, files) {
+  const client = await page.context().newCDPSession(page);
+  for (const type of ["dragEnter", "dragOver", "drop"]) {
+    await client.send("Input.dispatchDragEvent", { type, x: 300, y: 300, data: { items: [], files, dragOperationsMask: 1 } });
+  }
+  await client.detach();
+}
+
+test("meshes of other formats and in several files are built, from a folder, too", async () => {
   const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
   await reach(page, "complete");
-  const told = async (name, text) => {
-    await drop(page, name, text);
-    await page.locator("#message").waitFor({ timeout: PATIENCE });
-    const words = await page.innerText("#message");
-    await page.click("#dismiss");
-    return words;
+  const dialog = page.locator("dialog.build");
+  /** Builds what was dropped, and closes the dialog. */
+  const built = async (said, tetrahedra, name) => {
+    await dialog.getByText(said).waitFor({ timeout: PATIENCE });
+    await dialog.getByRole("button", { name: "Build" }).click();
+    const isShown = (wanted) => window.tetralodDemo.info?.tetrahedra === wanted && window.tetralodDemo.state === "complete";
+    await page.waitForFunction(isShown, tetrahedra, { timeout: PATIENCE });
+    assert.equal(await page.locator("#volume option:checked").innerText(), name);
+    await screenshot(page, `page-built-${name}`);
+    await dialog.getByRole("button", { name: "Close" }).click();
+    await dialog.waitFor({ state: "detached" });
   };
-  for (const ending of ["msh", "mesh", "exo", "nrrd", "mha", "mhd", "vtkhdf", "pvtu", "pvd", "vol", "node"]) {
-    const words = await told(`my mesh.${ending}`, "$MeshFormat");
-    assert.match(words, /does not read the file/);
-    assert.ok(words.includes(`tetralod build 'my mesh.${ending}' -o 'my mesh.mt'`), words);
+  // Without their folder, as they are dropped from one.
+  const flat = inPieces(4).map(([name, text]) => [name.replace("case/", ""), text]);
+  await dropAll(page, [...flat].reverse());
+  await built("pvtu, 250 points, 768 tetrahedra", 768, "case.mt");
+  assert.match(await page.innerText("#growth"), /^768 tetrahedra: \d+ kB as PVTU, /);
+
+  await dropAll(page, flat.slice(0, 2));
+  const alert = dialog.locator("[role=alert]");
+  await alert.waitFor({ timeout: PATIENCE });
+  assert.equal(await alert.innerText(), 'case.pvtu: piece 1: it needs the file "case/1.vtu", which is not among those that were given; give them together');
+  await screenshot(page, "page-missing-piece");
+  await dialog.getByRole("button", { name: "Cancel" }).click();
+
+  const corners = ["0 0 0", "2 0 0", "0 2 0", "0 0 2", "0.5 0.5 0.5"].map((place, i) => `${i + 1} ${place}`);
+  const cells = [
+    [1, 2, 3, 5],
+    [1, 2, 5, 4],
+    [1, 5, 3, 4],
+    [5, 2, 3, 4],
+  ].map((cell, i) => `${i + 1} 4 2 1 1 ${cell.join(" ")}`);
+  const values = corners.map((_, i) => `${i + 1} ${i * i}`);
+  const gmsh = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", 5, ...corners, "$EndNodes", "$Elements", 4, ...cells, "$EndElements"];
+  const view = ["$NodeData", 1, '"heat"', 1, 0, 3, 0, 1, 5, ...values, "$EndNodeData", ""];
+  await drop(page, "block.msh", [...gmsh, ...view].join("\n"));
+  await built("gmsh, 5 points, 4 tetrahedra", 4, "block.mt");
+
+  const folder = await mkdtemp(join(tmpdir(), "tetralod-drop-"));
+  try {
+    await mkdir(join(folder, "case"));
+    for (const [name, text] of [...inPieces(3), ["case/run.log", "words"], [".hidden", "words"]]) await writeFile(join(folder, name), text);
+    await dropPaths(page, [folder]);
+    await dialog.getByText("pvtu, 128 points, 324 tetrahedra").waitFor({ timeout: PATIENCE });
+    await dialog.getByRole("button", { name: "Build" }).click();
+    const said = dialog.getByText("Left out of the folder, for it is no mesh");
+    await said.waitFor({ timeout: PATIENCE });
+    assert.match(await said.innerText(), /: tetralod-drop-\w+\/case\/run\.log$/);
+    await screenshot(page, "page-built-folder");
+    await dialog.getByRole("button", { name: "Close" }).click();
+  } finally {
+    await rm(folder, { recursive: true });
   }
-  assert.match(await told("part.stl", "solid part"), /part\.stl: This page opens \.mt files, and builds them of \.vtu.*also reads .*Gmsh/s);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("what is no mesh is named, with what to do", async () => {
+  const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
+  await reach(page, "complete");
+  const dialog = page.locator("dialog.build");
+  for (const [name, text, words] of [
+    ["part.stl", "solid part", /^part\.stl: a surface mesh \(STL\) cannot be read here; fill it with tetrahedra/],
+    ["notes.txt", "words", /^notes\.txt: not a format that is known here; give VTK XML .* Gmsh \(\.msh\)/],
+    ["a.node", "4 3 0 0", /^a\.node: it needs the file "a\.ele"/],
+  ]) {
+    await drop(page, name, text);
+    const alert = dialog.locator("[role=alert]");
+    await alert.waitFor({ timeout: PATIENCE });
+    assert.match(await alert.innerText(), /** @type {RegExp} */ (words));
+    await dialog.getByRole("button", { name: "Cancel" }).click();
+    await dialog.waitFor({ state: "detached" });
+  }
   assert.equal(await page.evaluate(() => window.tetralodDemo.state), "complete", "the volume stays");
   // The content says what is an MT file.
   await page.evaluate(async () => {

@@ -7,10 +7,10 @@ use tetralod::mesh::{Field, Grid};
 /// What a file says that it contains. The data may be damaged even so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, natively also
-    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, and with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
+    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, the same with a `p` in front where it lists files with pieces, `"vtk"`, `"raw"`,
+    /// `"gmsh"`, `"medit"`, `"tetgen"`, `"netgen"`, `"nrrd"` or `"metaimage"`, and with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
     pub format: &'static str,
-    /// The number of points. Polyhedra may get more in their middle.
+    /// The number of points; those that several pieces have count in each. Polyhedra may get more in their middle.
     pub points: u64,
     /// The tetrahedra, at most, that its cells are or are split into; more where bent faces of polyhedra get points in their middle.
     pub cells: u64,

@@ -23,12 +23,19 @@ pub enum ReadReason {
     /// The file could not be opened or read.
     #[error("{0}")]
     Io(String),
+    /// A file that this one needs is not among those that were given.
+    #[error("it needs the file \"{0}\", which is not among those that were given; give them together")]
+    NotGiven(String),
+    /// Several of the files that were given may be the one that this one needs.
+    #[error(
+        "it needs the file \"{0}\", of which several were given; give them in their folders, or one of them"
+    )]
+    SeveralGiven(String),
     /// The content is of no known kind.
     #[error(
-        "not a format that is known here; give VTK XML (.vtu, .vti, .vts, .vtr), legacy VTK (.vtk){}{}, or raw samples with a \
-         .json sidecar",
-        if cfg!(feature = "hdf5") { ", VTKHDF, Exodus" } else { "" },
-        if cfg!(not(target_arch = "wasm32")) { ", Gmsh (.msh), Medit (.mesh), TetGen (.node, .ele), Netgen (.vol), NRRD or MetaImage" } else { "" }
+        "not a format that is known here; give VTK XML (.vtu, .vti, .vts, .vtr), legacy VTK (.vtk){}, Gmsh (.msh), Medit (.mesh), \
+         TetGen (.node, .ele), Netgen (.vol), NRRD or MetaImage, or raw samples with a .json sidecar",
+        if cfg!(feature = "hdf5") { ", VTKHDF, Exodus" } else { "" }
     )]
     UnknownFormat,
     /// The text does not follow the rules of its format.
@@ -296,7 +303,7 @@ pub(super) fn names(kind: i64) -> Option<(&'static str, &'static str)> {
 impl tetralod::Coded for ReadError {
     fn code(&self) -> &'static str {
         match self.reason {
-            ReadReason::Io(_) => "bad-source",
+            ReadReason::Io(_) | ReadReason::NotGiven(_) | ReadReason::SeveralGiven(_) => "bad-source",
             ReadReason::UnknownFormat => "unknown-format",
             ReadReason::Unsupported { .. } | ReadReason::CellTypes(_) | ReadReason::NoVolume(_) => {
                 "unsupported"

@@ -8,7 +8,7 @@ use crate::listed::for_each_file;
 use crate::vtu;
 use crate::xml::Document;
 use crate::{Beside, ReadOptions};
-use tetralod::mesh::TetMesh;
+use tetralod::mesh::{Field, TetMesh};
 
 /// Reads a document of type `ImageData`, or `PImageData` with the files that it lists, and its time.
 pub(super) fn read(
@@ -26,11 +26,15 @@ pub(super) fn read(
     Ok((placement.mesh(values, &options.memory).at(whole_place)?, time))
 }
 
-/// Says what a document of type `ImageData` contains.
-pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
-    let place = || "<ImageData>".to_owned();
+/// Says what a document of type `ImageData` contains, or one that lists files with the pieces of one, whose fields are `names`.
+pub(super) fn survey(
+    format: &'static str,
+    document: &Document<'_>,
+    names: [Vec<Field>; 2],
+) -> Result<Survey, ReadError> {
+    let place = || format!("<{}>", document.kind);
     let (placement, _) = read_placement(document).at(place)?;
-    Survey::of_placement("vti", &placement, vtu::names(document)?).at(place)
+    Survey::of_placement(format, &placement, names).at(place)
 }
 
 fn read_placement(document: &Document<'_>) -> Result<(Placement, Extent), ReadReason> {

@@ -1,6 +1,6 @@
 //! Reads and writes exchange formats for [`tetralod`]: meshes and grids from files, and back to VTK; and makes volumes by formula.
 //!
-//! Formats with "native" are not read in WebAssembly. Those with "`hdf5`" need that feature, too.
+//! Formats with "`hdf5`" need that feature. All are read from files on a disk and [in memory](FilesInMemory) alike, also in WebAssembly.
 //!
 //! | format | ending | read | written |
 //! |---|---|---|---|
@@ -8,16 +8,16 @@
 //! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
 //! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured, structured and rectilinear grids, structured points | |
 //! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
-//! | VTK XML, each of these in several files | `.pvtu`, `.pvti`, `.pvtr`, `.pvts` | by [`read`]; native | |
+//! | VTK XML, each of these in several files | `.pvtu`, `.pvti`, `.pvtr`, `.pvts` | with the files that they list | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
-//! | Gmsh, versions 2 to 4.1 | `.msh` | text and binary; native | |
-//! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; native | |
-//! | TetGen | `.node` + `.ele` | by [`read`]; native | |
-//! | Netgen | `.vol` | native | |
-//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal; native | |
-//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text; native | |
-//! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; native, `hdf5` | |
-//! | Exodus II | `.exo`, `.ex2`, `.e` | native, `hdf5` | |
+//! | Gmsh, versions 2 to 4.1 | `.msh` | text and binary | |
+//! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary | |
+//! | TetGen | `.node` + `.ele` | text | |
+//! | Netgen | `.vol` | text | |
+//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal | |
+//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text | |
+//! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; `hdf5` | |
+//! | Exodus II | `.exo`, `.ex2`, `.e` | `hdf5` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |
@@ -29,7 +29,7 @@
 //! `name_magnitude`, of a symmetric tensor also `name_von_mises` and `name_principal_1` to 3. Units and times are kept
 //! where the file contains them. Arrays at cells are read where that is asked for ([`ReadOptions::cells`]), arrays that
 //! are not numbers are left out.
-//! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`].
+//! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`] and [`FilesInMemory::steps`].
 //! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones and polyhedra; cells without a
 //! volume are left out beside them. How cells are split is in `cell_shapes` and `polyhedra`. Readers check the file, not the mesh: see
 //! [`tetralod::mesh::repair`]. Meshes in several files can be read one piece at a time: `Pieces`.
@@ -57,6 +57,7 @@ mod ghosts;
 mod grid;
 mod grid_parts;
 mod image;
+mod in_memory;
 mod legacy;
 mod listed;
 mod memory;
@@ -85,6 +86,7 @@ mod xz;
 
 pub use contents::Survey;
 pub use error::{ReadError, ReadReason};
+pub use in_memory::{FilesInMemory, StepInMemory};
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
 #[doc(hidden)]
@@ -95,9 +97,9 @@ pub use pvd::{Step, steps};
 #[doc(hidden)]
 pub use surface::{PointValues, write_csv, write_obj};
 pub use surface::{PolyData, write_ply, write_stl, write_vtp};
-pub use survey::survey;
 #[doc(hidden)]
-pub use survey::{format_of, held_bytes, survey_raw};
+pub use survey::format_of;
+pub use survey::survey;
 #[doc(hidden)]
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 #[doc(hidden)]
@@ -108,7 +110,7 @@ pub use write_layers::write_vti_layers;
 
 use std::path::Path;
 
-use crate::beside::FilesOf;
+use crate::beside::{FilesOf, Source};
 use crate::error::{At, in_file};
 use crate::file_kind::{lower_extension, without_gz, without_mark};
 use crate::listed::not_read;
@@ -131,8 +133,13 @@ pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
 /// # Errors
 /// As [`read`]; a field that is wanted and not there is no error.
 pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let read = read_unexpanded(path, options)?;
-    expanded(read, options).in_file(&path.display().to_string())
+    read_files(&FilesOf::on_disk(path, &options.memory), options)
+}
+
+/// The mesh of a file and those that it needs.
+fn read_files(files: &FilesOf<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let read = read_unsettled(files, options).map(settled)?;
+    expanded(read, options).in_file(&files.name())
 }
 
 /// The mesh as callers get it: finite numbers at points that no cell uses, no cells that fold because they were cut into straight
@@ -160,45 +167,42 @@ fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadRea
 /// As [`read_with`].
 #[doc(hidden)]
 pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    read_unsettled(path, options).map(settled)
+    read_unsettled(&FilesOf::on_disk(path, &options.memory), options).map(settled)
 }
 
-fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let name = path.display().to_string();
-    if path.is_dir() {
-        return Err(foreign::refused_folder(path)).in_file(&name);
+fn read_unsettled(files: &FilesOf<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    if matches!(files.source, Source::Disk) && files.given.is_dir() {
+        return Err(foreign::refused_folder(files.given)).in_file(&files.name());
     }
-    let files = FilesOf::new(path, &options.memory);
-    let mut mesh = match lower_extension(path).as_str() {
-        "json" => read_raw_by_sidecar(&files, path, None, &options.memory)?,
-        "raw" => read_raw_by_sidecar(&files, &path.with_extension("json"), Some(path), &options.memory)?,
-        "node" | "ele" => formats::tetgen::read(&files, path, options)?,
-        _ => match read_ranges(path, options) {
+    let mut mesh = match lower_extension(files.given).as_str() {
+        "json" | "raw" => read_raw_by_sidecar(files, &options.memory)?,
+        "node" | "ele" => formats::tetgen::read(files, options)?,
+        _ => match read_ranges(files, options) {
             Some(read) => read?,
-            None => read_in(&name, &files.load_one(path)?, options, &|file| files.load(file))?,
+            None => read_in(&files.name(), &files.load_given()?, options, &|file| files.load(file))?,
         },
     };
-    mesh.input.files.0 = files.into_read();
+    mesh.input.files.0 = files.all_read();
     Ok(mesh)
 }
 
 /// Reads what is wanted of a file of a format that need not be read as a whole; none if it is another one.
 #[cfg(feature = "hdf5")]
-fn read_ranges(path: &Path, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
-    formats::hdf5::read_at(path, options)
+fn read_ranges(files: &FilesOf<'_>, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    formats::hdf5::read_given(files, options)
 }
 
 #[cfg(not(feature = "hdf5"))]
-fn read_ranges(_: &Path, _: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+fn read_ranges(_: &FilesOf<'_>, _: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
     None
 }
 
 /// Reads a mesh or grid from the bytes of a file; `name` is used in errors alone.
 ///
-/// Raw samples come in two files: see [`read_raw`].
+/// What comes in several files is read from [`FilesInMemory`].
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read`], and if the file needs others.
 pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
     read_bytes_with(name, bytes, &ReadOptions::default())
 }
@@ -206,14 +210,13 @@ pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 /// Reads what is wanted from the bytes of a file, otherwise as [`read_bytes`].
 ///
 /// # Errors
-/// As [`read_with`], and if the file refers to others.
+/// As [`read_with`], and if the file needs others.
 pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let alone = |file: &str| {
-        let what = format!("a file that needs another (\"{file}\")");
-        Err(ReadReason::unsupported(what, "give it by its path, with the other beside it"))
-    };
-    let read = read_in(name, bytes, options, &alone).map(settled)?;
-    expanded(read, options).in_file(name)
+    let mut mesh =
+        read_files(&FilesOf::new(Path::new(name), Source::Bytes(bytes), &options.memory), options)?;
+    // The name is no path.
+    mesh.input.files.0.clear();
+    Ok(mesh)
 }
 
 /// Reads a file that may refer to others.
@@ -251,21 +254,22 @@ pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, R
     mesh.in_file(name)
 }
 
-fn read_raw_by_sidecar(
-    files: &FilesOf<'_>,
-    sidecar_path: &Path,
-    samples_path: Option<&Path>,
-    memory: &MemoryLimit,
-) -> Result<TetMesh, ReadError> {
-    let name = sidecar_path.display().to_string();
-    let sidecar = raw::Sidecar::parse(&files.load_one(sidecar_path)?).in_file(&name)?;
-    let samples_path = match (samples_path, &sidecar.file) {
-        (Some(path), _) => path.to_owned(),
-        (None, Some(file)) => sidecar_path.with_file_name(file),
-        (None, None) => sidecar_path.with_extension("raw"),
+fn read_raw_by_sidecar(files: &FilesOf<'_>, memory: &MemoryLimit) -> Result<TetMesh, ReadError> {
+    let sidecar = sidecar(files)?;
+    let samples_path = match &sidecar.file {
+        _ if lower_extension(files.given) == "raw" => files.given.to_owned(),
+        Some(file) => files.given.with_file_name(file),
+        None => files.given.with_extension("raw"),
     };
     let samples = files.load_one(&samples_path)?;
     sidecar.mesh(&samples, memory).in_file(&samples_path.display().to_string())
+}
+
+/// The sidecar of raw samples, of which either is given.
+fn sidecar(files: &FilesOf<'_>) -> Result<raw::Sidecar, ReadError> {
+    let is_samples = lower_extension(files.given) == "raw";
+    let path = if is_samples { &files.given.with_extension("json") } else { files.given };
+    raw::Sidecar::parse(&files.load_one(path)?).in_file(&path.display().to_string())
 }
 
 fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {

@@ -5,7 +5,7 @@ use crate::file_kind::without_mark;
 use crate::memory::MemoryLimit;
 use crate::options::Beside;
 use crate::packed;
-use crate::xml::{Document, IN_FILES, ReadFile};
+use crate::xml::{Document, IN_FILES, Piece, ReadFile};
 
 /// Has `read` read the document, or the files that it lists, whose bytes count in the limit; returns the time of the first one that has one.
 pub(super) fn for_each_file(
@@ -18,13 +18,9 @@ pub(super) fn for_each_file(
         read(document)?;
         return Ok(document.time());
     }
-    if cfg!(target_arch = "wasm32") {
-        return Err(not_read(&document.kind)).at(String::new);
-    }
     let mut time = None;
     for (number, piece) in document.pieces.iter().enumerate() {
-        let missing = || ReadReason::Missing("attribute Source".into());
-        let source = piece.attributes.get("Source").ok_or_else(missing).at(|| format!("piece {number}"))?;
+        let source = source(piece).at(|| format!("piece {number}"))?;
         let bytes = beside(source).at(|| format!("piece {number}"))?;
         let bytes = packed::unpacked(&bytes, memory).at(|| format!("piece {number}"))?;
         let mut read_file = || {
@@ -44,6 +40,18 @@ pub(super) fn for_each_file(
     Ok(time)
 }
 
+/// The name of the file with a piece.
+fn source<'a>(piece: &'a Piece<'_>) -> Result<&'a str, ReadReason> {
+    piece.attributes.get("Source").ok_or_else(|| ReadReason::Missing("attribute Source".into()))
+}
+
+/// The names of the files that a document lists.
+pub(super) fn names(document: &Document<'_>) -> Vec<String> {
+    let is_list = document.kind.starts_with(IN_FILES);
+    let pieces = document.pieces.iter().filter(|_| is_list);
+    pieces.filter_map(|piece| source(piece).ok().map(str::to_owned)).collect()
+}
+
 /// Why an XML file of this type is refused.
 pub(super) fn not_read(kind: &str) -> ReadReason {
     let (what, remedy) = match kind {
@@ -51,9 +59,6 @@ pub(super) fn not_read(kind: &str) -> ReadReason {
             return ReadReason::NoVolume("a data set of type PolyData".into());
         }
         "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
-        "PUnstructuredGrid" | "PImageData" | "PRectilinearGrid" | "PStructuredGrid" => {
-            ("a list of pieces".into(), "give one of the files that it lists")
-        }
         other => (
             format!("a data set of type {other}"),
             "give an UnstructuredGrid, a StructuredGrid, a RectilinearGrid or ImageData",

@@ -44,4 +44,4 @@ pub enum CellData {
 }
 
 /// Gets the bytes of another file, by its path from the folder of the one that is read.
-pub(super) type Beside<'a> = &'a dyn Fn(&str) -> Result<FileBytes<'static>, ReadReason>;
+pub(super) type Beside<'a> = &'a dyn Fn(&str) -> Result<FileBytes<'a>, ReadReason>;

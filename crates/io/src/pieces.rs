@@ -7,7 +7,6 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::beside::FilesOf;
-use crate::beside::load;
 use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::settle_unused;
 use crate::file_kind::without_mark;
@@ -48,7 +47,7 @@ impl Pieces {
     /// # Errors
     /// If the list cannot be read or is damaged.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Option<Self>, ReadError> {
-        let bytes = load(path, &options.memory)?;
+        let bytes = FilesOf::on_disk(path, &options.memory).load_given()?;
         let bytes = packed::unpacked(&bytes, &options.memory).in_file(&path.display().to_string())?.to_vec();
         if super::format_of(&bytes) != Some("pvtu") {
             return Ok(None);
@@ -63,7 +62,7 @@ impl Pieces {
     pub fn counts(&self) -> Result<PieceCounts, ReadError> {
         let document = Document::parse(without_mark(&self.list)).map_err(|error| self.named(error))?;
         let mut counts = PieceCounts::default();
-        let files = FilesOf::new(&self.path, &self.options.memory);
+        let files = FilesOf::on_disk(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
         let counted = for_each_file(&document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
@@ -113,7 +112,7 @@ impl Pieces {
         document: &Document<'_>,
         each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
     ) -> Result<(), ReadError> {
-        let files = FilesOf::new(&self.path, &self.options.memory);
+        let files = FilesOf::on_disk(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
         let mut hashes = Vec::new();
         let time = for_each_file(document, &beside, &self.options.memory, &mut |file| {

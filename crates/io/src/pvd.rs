@@ -2,20 +2,20 @@
 
 use std::io;
 use std::io::Write;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
-use crate::beside::{self, load};
-use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::beside::{self, FilesOf, expect_below};
+use crate::error::{At, ReadError, ReadReason};
 use crate::file_kind::{lower_extension, without_gz};
 use crate::write::escaped;
 use crate::xml::Attributes;
 use crate::{MemoryLimit, formats, packed};
 
 /// Most bytes of a list, unpacked if it is in gzip: some hundred thousand time steps.
-const MOST_BYTES: u64 = 1 << 26;
+pub(super) const MOST_BYTES: u64 = 1 << 26;
 
 /// A file that holds one time step.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,25 +34,47 @@ pub struct Step {
 /// # Errors
 /// If the list cannot be read, is damaged or empty, or has several files for one time.
 pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
-    if lower_extension(Path::new(without_gz(&path.to_string_lossy()))) != "pvd" {
-        let step = |(number, time)| Step { path: path.to_owned(), time, number };
-        let times = formats::times_at(path)?;
+    let is_list = is_list(&path.to_string_lossy());
+    let memory = if is_list { MemoryLimit::of(MOST_BYTES) } else { MemoryLimit::default() };
+    let files = FilesOf::on_disk(path, &memory);
+    steps_of(
+        &files,
+        |file| beside::place(path, file),
+        |path, time, number| Step { path, time, number },
+        path.to_owned(),
+    )
+}
+
+/// Whether a file of this name lists time steps.
+pub(super) fn is_list(name: &str) -> bool {
+    lower_extension(Path::new(without_gz(name))) == "pvd"
+}
+
+/// The time steps that the given file stands for: each in a file that `place` finds if it is listed, else in the given one.
+pub(super) fn steps_of<File: Clone, Step>(
+    files: &FilesOf<'_>,
+    place: impl Fn(&str) -> Result<File, ReadReason>,
+    step: impl Fn(File, Option<f64>, usize) -> Step,
+    given: File,
+) -> Result<Vec<Step>, ReadError> {
+    if !is_list(&files.name()) {
+        let times = formats::times(files)?;
         // The reader of a file with one step knows its time.
         if times.len() < 2 {
-            return Ok(vec![step((0, None))]);
+            return Ok(vec![step(given, None, 0)]);
         }
-        return Ok(times.into_iter().map(Some).enumerate().map(step).collect());
+        let numbered = times.into_iter().enumerate();
+        return Ok(numbered.map(|(number, time)| step(given.clone(), Some(time), number)).collect());
     }
-    let memory = &MemoryLimit::of(MOST_BYTES);
-    let listed = load(path, memory)
-        .and_then(|bytes| packed::unpacked(&bytes, memory).and_then(|bytes| parse(&bytes)).at(String::new));
-    let listed = listed.map_err(|error| in_file(error, &path.display().to_string()))?;
-    let step = |(time, file): (Option<f64>, String)| {
-        let path = beside::place(path, &file).at(String::new)?;
-        Ok(Step { path, time, number: 0 })
-    };
-    let steps: Result<_, ReadError> = listed.into_iter().map(step).collect();
-    steps.map_err(|error| in_file(error, &path.display().to_string()))
+    let listed = listed(&files.load_given()?).in_file(&files.name())?;
+    let steps: Result<_, _> =
+        listed.into_iter().map(|(time, file)| Ok(step(place(&file)?, time, 0))).collect();
+    steps.in_file(&files.name())
+}
+
+/// The times and files in a list with these bytes.
+pub(super) fn listed(bytes: &[u8]) -> Result<Vec<(Option<f64>, String)>, ReadReason> {
+    packed::unpacked(bytes, &MemoryLimit::of(MOST_BYTES)).and_then(|bytes| parse(&bytes))
 }
 
 /// Writes a list of time steps, whose files lie in the list's folder or below it; those without a time are numbered from 0.
@@ -118,11 +140,7 @@ fn entry(attributes: &Attributes) -> Result<(Option<f64>, String), ReadReason> {
     let not_a_time = || ReadReason::Syntax("a timestep is not a number".into());
     let time = attributes.get("timestep").filter(|time| !time.is_empty());
     let time = time.map(|time| finite(time).ok_or_else(not_a_time)).transpose()?;
-    let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
-    if file.is_empty() || !Path::new(file).components().all(below) {
-        let what = format!("a <DataSet> in another folder (\"{file}\")");
-        return Err(ReadReason::unsupported(what, "put the files beside the list or below it"));
-    }
+    expect_below(file)?;
     // Zero has two signs, which would not sort as equal.
     Ok((time.map(|time| time + 0.0), file.to_owned()))
 }

@@ -36,11 +36,14 @@ pub(super) fn read(
     Ok((mesh(dims.map(|d| d as u32), positions, values, &options.memory).at(place)?, time))
 }
 
-/// Says what a document of type `RectilinearGrid` or `StructuredGrid` contains.
-pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
+/// Says what a document of type `RectilinearGrid` or `StructuredGrid` contains, or one that lists files with the pieces of one, whose
+/// fields are these.
+pub(super) fn survey(
+    format: &'static str,
+    document: &Document<'_>,
+    [fields, cell_fields]: [Vec<Field>; 2],
+) -> Result<Survey, ReadError> {
     let (_, dims) = whole(document).at(|| format!("<{}>", document.kind))?;
-    let [fields, cell_fields] = vtu::names(document)?;
-    let format = if document.kind == RECTILINEAR { "vtr" } else { "vts" };
     let points = dims.iter().product();
     Ok(Survey { format, points, cells: most_tets(dims), grid: None, fields, cell_fields })
 }

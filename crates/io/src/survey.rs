@@ -1,64 +1,79 @@
 //! What a file contains, without its values: for questions before it is read, and for the memory that reading needs.
 
+use std::path::Path;
+
+use crate::beside::{FilesOf, Source};
 use crate::contents::Survey;
 use crate::error::{At, ReadError, in_file};
-use crate::file_kind::without_mark;
-use crate::listed::not_read;
+use crate::file_kind::{lower_extension, without_mark};
+use crate::formats::tetgen;
+use crate::listed::{for_each_file, not_read};
+use crate::xml::{Document, IN_FILES};
 use crate::{
-    CellData, MemoryLimit, ReadOptions, foreign, formats, image, legacy, packed, raw, structured, vtu, xml,
+    Beside, CellData, MemoryLimit, ReadOptions, foreign, formats, image, legacy, packed, read_files, sidecar,
+    structured, vtu,
 };
-use tetralod::mesh::Field;
+use tetralod::geom::Bounds;
+use tetralod::mesh::{Field, TetMesh};
 
 /// Says what is in the bytes of a file; `name` is used in errors alone. No array is decoded, so this takes little memory
-/// beside the bytes.
+/// beside the bytes; but files of formats that are not VTK's are read without their fields.
 ///
 /// # Errors
 /// As [`read_bytes`](super::read_bytes), as far as that follows from the structure of the file.
 pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
-    let unpacked = packed::unpacked(bytes, &MemoryLimit::default()).in_file(name)?;
+    let memory = MemoryLimit::default();
+    survey_files(&FilesOf::new(Path::new(name), Source::Bytes(bytes), &memory), &memory)
+        .map(|(survey, _)| survey)
+}
+
+/// Says what is in the given file and those that it needs, and between what its points lie where they had to be read for that.
+pub(super) fn survey_files(
+    files: &FilesOf<'_>,
+    memory: &MemoryLimit,
+) -> Result<(Survey, Option<Bounds>), ReadError> {
+    let name = files.name();
+    match lower_extension(files.given).as_str() {
+        "json" | "raw" => return Ok((sidecar(files)?.survey(), None)),
+        "node" | "ele" => return survey_by_reading(files, tetgen::NAME, memory),
+        _ => {}
+    }
+    let given = files.load_given()?;
+    let unpacked = packed::unpacked(&given, memory).in_file(&name)?;
     let bytes = &*unpacked;
     let start = without_mark(bytes);
-    let result = if bytes.starts_with(legacy::MAGIC) {
+    let survey = if bytes.starts_with(legacy::MAGIC) {
         legacy::survey(bytes)
     } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
-        survey_xml(start)
+        survey_xml(start, &|file| files.load(file), memory)
     } else {
-        survey_other(name, bytes)
+        let format = formats::name(bytes).ok_or_else(|| foreign::refused(&name, bytes)).in_file(&name)?;
+        drop(unpacked);
+        return survey_by_reading(files, format, memory);
     };
-    result.map_err(|e| in_file(e, name))
+    Ok((survey.map_err(|error| in_file(error, &name))?, None))
 }
 
-/// Says what a file of a format contains that is not VTK's: these are read for it.
-fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
-    let Some(format) = formats::name(bytes) else {
-        return Err(foreign::refused(name, bytes)).at(String::new);
+/// Says what files contain of a format that does not say it in one place: they are read without their fields.
+fn survey_by_reading(
+    files: &FilesOf<'_>,
+    format: &'static str,
+    memory: &MemoryLimit,
+) -> Result<(Survey, Option<Bounds>), ReadError> {
+    let options = ReadOptions {
+        fields: Some(Vec::new()),
+        cells: CellData::Names,
+        memory: memory.clone(),
+        ..ReadOptions::default()
     };
-    let options = ReadOptions { cells: CellData::Names, ..ReadOptions::default() };
-    let mesh = super::read_bytes_with(name, bytes, &options)?;
-    let described =
-        |fields: Vec<Field>| fields.into_iter().map(|field| Field { values: Vec::new(), ..field });
-    Ok(Survey {
-        format,
-        points: mesh.positions.len() as u64,
-        cells: mesh.tets.len() as u64,
-        grid: mesh.grid,
-        fields: described(mesh.fields).collect(),
-        cell_fields: described(mesh.cell_fields).collect(),
-    })
-}
-
-/// Says what the JSON sidecar of raw samples describes.
-///
-/// # Errors
-/// If the sidecar does not say what is needed.
-pub fn survey_raw(name: &str, sidecar: &[u8]) -> Result<Survey, ReadError> {
-    let sidecar = raw::Sidecar::parse(sidecar).in_file(name)?;
-    Ok(sidecar.survey())
-}
-
-/// How many bytes of memory a file takes while it is read, beside what is read of it: itself, and what it becomes when it is in gzip.
-pub fn held_bytes(bytes: &[u8]) -> u64 {
-    packed::stated_size(bytes)
+    // Readers that keep names apart have them among the fields.
+    let TetMesh { positions, tets, grid, mut fields, mut cell_fields, input, .. } =
+        read_files(files, &options)?;
+    fields.extend(input.other_fields);
+    cell_fields.extend(input.other_cell_fields);
+    let bounds = Some(Bounds::of(&positions)).filter(|_| !positions.is_empty());
+    let (points, cells) = (positions.len() as u64, tets.len() as u64);
+    Ok((Survey { format, points, cells, grid, fields, cell_fields }, bounds))
 }
 
 /// What the format of a file with these bytes is called, as [`Survey::format`] has it; none if it is not known. The rest of the
@@ -78,6 +93,11 @@ pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
         String::from_utf8_lossy(start.get(..start.len().min(1 << 12)).unwrap_or_default()).into_owned();
     let (_, kind) = head.split_once("<VTKFile")?.1.split_once("type=")?;
     let kind = kind.get(1..)?.split(['"', '\'']).next()?;
+    format_of_kind(kind)
+}
+
+/// What VTK's XML of a type is called; none if it is not read.
+fn format_of_kind(kind: &str) -> Option<&'static str> {
     let formats = [
         ("UnstructuredGrid", "vtu"),
         ("ImageData", "vti"),
@@ -91,12 +111,34 @@ pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
     formats.iter().find(|(name, _)| *name == kind).map(|(_, format)| *format)
 }
 
-fn survey_xml(bytes: &[u8]) -> Result<Survey, ReadError> {
-    let document = xml::Document::parse(bytes)?;
-    match document.kind.as_str() {
-        "UnstructuredGrid" => vtu::survey(&document),
-        "ImageData" => image::survey(&document),
-        structured::RECTILINEAR | structured::CURVILINEAR => structured::survey(&document),
-        other => Err(not_read(other)).at(String::new),
+fn survey_xml(bytes: &[u8], beside: Beside<'_>, memory: &MemoryLimit) -> Result<Survey, ReadError> {
+    let document = Document::parse(bytes)?;
+    let Some(format) = format_of_kind(&document.kind) else {
+        return Err(not_read(&document.kind)).at(String::new);
+    };
+    let is_unstructured = document.kind.ends_with("UnstructuredGrid");
+    let (mut points, mut cells, mut names) = (0_u64, 0_u64, None);
+    for_each_file(&document, beside, memory, &mut |file| {
+        if is_unstructured {
+            let of_file = vtu::counts(file)?;
+            points = points.saturating_add(of_file[0]);
+            cells = cells.saturating_add(of_file[1]);
+        }
+        if names
+            .as_ref()
+            .is_none_or(|[fields, cell_fields]: &[Vec<Field>; 2]| fields.is_empty() && cell_fields.is_empty())
+        {
+            names = Some(vtu::names(file)?);
+        }
+        Ok(())
+    })?;
+    let names = names.unwrap_or_default();
+    match document.kind.strip_prefix(IN_FILES).unwrap_or(&document.kind) {
+        "ImageData" => image::survey(format, &document, names),
+        structured::RECTILINEAR | structured::CURVILINEAR => structured::survey(format, &document, names),
+        _ => {
+            let [fields, cell_fields] = names;
+            Ok(Survey { format, points, cells, grid: None, fields, cell_fields })
+        }
     }
 }

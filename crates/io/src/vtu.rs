@@ -9,7 +9,7 @@ use crate::number::points_from;
 use crate::numbering::Numbering;
 use crate::polyhedra::{self, FaceLists, SharedFaces};
 use crate::xml::{Array, Document, Piece};
-use crate::{CellData, ReadOptions, Survey, cell_types, cells};
+use crate::{CellData, ReadOptions, cell_types, cells};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
 /// Reads a document of type `UnstructuredGrid`. The points of different pieces stay different points.
@@ -32,16 +32,16 @@ pub(super) fn first_number(first: usize, points: usize) -> Result<u32, ReadReaso
     end.map(|_| first as u32).ok_or_else(too_large)
 }
 
-/// Says what a document of type `UnstructuredGrid` contains; of its arrays only the types of cells are decoded.
-pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
+/// How many points there are in a document of type `UnstructuredGrid`, and how many tetrahedra at most; of its arrays only the types of
+/// cells are decoded.
+pub(super) fn counts(document: &Document<'_>) -> Result<[u64; 2], ReadError> {
     let (mut points, mut cells) = (0_u64, 0_u64);
     for reader in readers(document, &ReadOptions::default()) {
         let count = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
         points = points.saturating_add(count as u64);
         cells = cells.saturating_add(reader.most_tets()?);
     }
-    let [fields, cell_fields] = names(document)?;
-    Ok(Survey { format: "vtu", points, cells, grid: None, fields, cell_fields })
+    Ok([points, cells])
 }
 
 /// The fields at points and at cells of the first piece, without values.

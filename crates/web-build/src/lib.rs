@@ -9,6 +9,7 @@ use crate::options::{BuildOptions, build_options};
 use js_sys::{Function, Object, Reflect, Uint8Array};
 use serde::Serialize;
 use std::cell::RefCell;
+use std::collections::TryReserveError;
 use std::ops::ControlFlow;
 use tetralod::Coded;
 use tetralod::format::{EncodeOptions, encode};
@@ -19,7 +20,7 @@ use tetralod::mesh::{
 use tetralod::mt::{AveragedField, MultiTessellation};
 use tetralod_build::{self as builder, BuildConfig, BuildError, BuildProgress, BuildSummary, Remedy};
 use tetralod_io::{
-    self as io, CellData, FieldSelection, MemoryLimit, ReadError, ReadOptions, Survey, read_time_steps,
+    CellData, FieldSelection, FilesInMemory, MemoryLimit, ReadOptions, StepInMemory, Survey, read_time_steps,
 };
 use tetralod_web_options::error::WebError;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -49,38 +50,9 @@ thread_local! {
 /// The files of a mesh, and the MT that is built of them.
 #[wasm_bindgen]
 pub struct MeshBuilder {
-    files: Vec<InputFile>,
+    files: FilesInMemory,
     /// Bytes of memory that may be used.
     memory: u64,
-}
-
-/// The file of a time step, or of the whole mesh.
-#[derive(Default)]
-struct InputFile {
-    name: String,
-    bytes: Vec<u8>,
-    sidecar: Option<(String, Vec<u8>)>,
-}
-
-impl InputFile {
-    fn survey(&self) -> Result<Survey, WebError> {
-        Ok(match &self.sidecar {
-            Some((name, sidecar)) => io::survey_raw(name, sidecar)?,
-            None => io::survey(&self.name, &self.bytes)?,
-        })
-    }
-
-    fn read(&self, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-        match &self.sidecar {
-            // What is wrong with the sidecar alone was found before.
-            Some((_, sidecar)) => io::read_raw(&self.name, sidecar, &self.bytes),
-            None => io::read_bytes_with(&self.name, &self.bytes, options),
-        }
-    }
-
-    fn size(&self) -> u64 {
-        io::held_bytes(&self.bytes) + self.sidecar.as_ref().map_or(0, |(_, bytes)| bytes.len() as u64)
-    }
 }
 
 #[wasm_bindgen]
@@ -98,42 +70,26 @@ impl MeshBuilder {
             });
         }));
         let memory = memory.map_or(LARGEST_MEMORY, |bytes| (bytes.max(0.0) as u64).min(LARGEST_MEMORY));
-        Self { files: Vec::new(), memory }
+        Self { files: FilesInMemory::default(), memory }
     }
 
-    /// Begins a file of so many bytes, which `append` brings. Each further file is a time step.
+    /// Begins a file of so many bytes, which `append` brings. Each further file that no other one names is a time step.
     #[wasm_bindgen(js_name = addFile)]
-    pub fn add_file(&mut self, name: String, size: f64) -> Result<(), WebError> {
-        let held: u64 = self.files.iter().map(InputFile::size).sum();
-        let whole = held.saturating_add(size.max(0.0) as u64);
+    pub fn add_file(&mut self, name: &str, size: f64) -> Result<(), WebError> {
+        let whole = self.files.held_bytes().saturating_add(size.max(0.0) as u64);
         if whole > self.memory {
-            return Err(self.too_large(&name, whole));
+            return Err(self.too_large(name, whole));
         }
-        let mut file = InputFile { name, ..InputFile::default() };
+        self.files.begin(name.to_owned());
         // The size fits: it is at most that of the memory, which is less than 2^32.
-        if file.bytes.try_reserve_exact(size.max(0.0) as usize).is_err() {
-            return Err(self.too_large(&file.name, whole));
-        }
-        self.files.push(file);
-        Ok(())
+        self.reserve(|bytes| bytes.try_reserve_exact(size.max(0.0) as usize), whole)
     }
 
     /// Appends bytes to the file that was begun last.
     pub fn append(&mut self, bytes: &[u8]) -> Result<(), WebError> {
-        let memory = self.memory;
-        let Some(file) = self.files.last_mut() else { return Err(no_file()) };
-        if file.bytes.try_reserve(bytes.len()).is_err() {
-            return Err(too_large(&file.name, file.size() + bytes.len() as u64, memory));
-        }
-        file.bytes.extend_from_slice(bytes);
-        Ok(())
-    }
-
-    /// The JSON beside the raw samples that were begun last.
-    #[wasm_bindgen(js_name = addSidecar)]
-    pub fn add_sidecar(&mut self, name: String, bytes: &[u8]) -> Result<(), WebError> {
-        let Some(file) = self.files.last_mut() else { return Err(no_file()) };
-        file.sidecar = Some((name, bytes.to_vec()));
+        let whole = self.files.held_bytes().saturating_add(bytes.len() as u64);
+        self.reserve(|file| file.try_reserve(bytes.len()), whole)?;
+        self.files.last_mut().into_iter().for_each(|(_, file)| file.extend_from_slice(bytes));
         Ok(())
     }
 
@@ -141,16 +97,17 @@ impl MeshBuilder {
     /// enough memory.
     pub fn inspect(&self, options: JsBuildOptions) -> Result<JsInputInfo, WebError> {
         let options = build_options(&options)?;
-        let (first, survey) = self.first()?;
-        let forecast = self.forecast(&survey, &options);
-        let bounds = match &survey.grid {
-            Some(grid) => Some(Bounds::of(&[grid.point([0; 3]), grid.point(grid.dims.map(|d| d - 1))])),
-            None if forecast.reading > self.memory => None,
-            None => {
+        let steps = self.steps()?;
+        let (survey, bounds) = self.survey(&steps)?;
+        let forecast = self.forecast(&survey, &steps, &options);
+        let bounds = match (&survey.grid, bounds, steps.first()) {
+            (Some(grid), ..) => Some(Bounds::of(&[grid.point([0; 3]), grid.point(grid.dims.map(|d| d - 1))])),
+            (None, None, Some(first)) if forecast.reading <= self.memory => {
                 let options = ReadOptions { fields: Some(Vec::new()), ..ReadOptions::default() };
-                let points = first.read(&options)?.positions;
+                let points = self.files.read(first, &options)?.positions;
                 Some(Bounds::of(&points)).filter(|_| !points.is_empty())
             }
+            (None, bounds, _) => bounds,
         };
         Ok(info(&survey, bounds, forecast.peak(), self.memory))
     }
@@ -159,30 +116,56 @@ impl MeshBuilder {
     /// where they change; if it returns `true`, the work stops. The files are gone then.
     pub fn build(&mut self, options: JsBuildOptions, progress: &Function) -> Result<JsBuilt, WebError> {
         let options = build_options(&options)?;
-        let (_, survey) = self.first()?;
+        let steps = self.steps()?;
+        let (survey, _) = self.survey(&steps)?;
         Self::check_fields(&survey, &options)?;
-        let forecast = self.forecast(&survey, &options);
+        let forecast = self.forecast(&survey, &steps, &options);
         if forecast.peak() > self.memory {
             return Err(no_memory(&survey, forecast.peak(), self.memory));
         }
         let stages = Stages { progress, stopped: false };
-        self.build_of(options, stages)
+        self.build_of(&steps, options, stages)
     }
 }
 
 impl MeshBuilder {
-    fn first(&self) -> Result<(&InputFile, Survey), WebError> {
-        let first = self.files.first().ok_or_else(no_file)?;
-        Ok((first, first.survey()?))
+    /// Makes room in the file that was begun last, where all files then have `whole` bytes.
+    fn reserve(
+        &mut self,
+        make_room: impl FnOnce(&mut Vec<u8>) -> Result<(), TryReserveError>,
+        whole: u64,
+    ) -> Result<(), WebError> {
+        let Some((name, bytes)) = self.files.last_mut() else { return Err(no_file()) };
+        if make_room(bytes).is_ok() {
+            return Ok(());
+        }
+        let name = name.to_owned();
+        Err(self.too_large(&name, whole))
+    }
+
+    fn steps(&self) -> Result<Vec<StepInMemory>, WebError> {
+        let steps = self.files.steps()?;
+        if steps.is_empty() { Err(no_file()) } else { Ok(steps) }
+    }
+
+    /// What the first step contains, and between what its points lie where they had to be read for that.
+    fn survey(&self, steps: &[StepInMemory]) -> Result<(Survey, Option<Bounds>), WebError> {
+        let first = steps.first().ok_or_else(no_file)?;
+        let rest = self.memory.saturating_sub(self.files.held_bytes());
+        Ok(self.files.survey(first, &MemoryLimit::of(rest))?)
     }
 
     fn too_large(&self, name: &str, bytes: u64) -> WebError {
-        too_large(name, bytes, self.memory)
+        let [bytes, memory] = [bytes, self.memory].map(megabytes);
+        let remedy = "use the command `tetralod build`";
+        WebError::new(
+            "memory",
+            format!("{name}: the files have {bytes} MB, but there are {memory} MB of memory; {remedy}"),
+        )
     }
 
-    fn forecast(&self, survey: &Survey, options: &BuildOptions) -> Forecast {
-        let files = self.files.iter().map(InputFile::size).sum();
-        Forecast::of(survey, files, self.files.len() as u64, options)
+    fn forecast(&self, survey: &Survey, steps: &[StepInMemory], options: &BuildOptions) -> Forecast {
+        Forecast::of(survey, self.files.held_bytes(), steps.len() as u64, options)
     }
 
     /// Refuses fields that are not there before anything is read.
@@ -211,11 +194,20 @@ impl MeshBuilder {
         Ok(())
     }
 
-    fn build_of(&mut self, options: BuildOptions, mut stages: Stages<'_>) -> Result<JsBuilt, WebError> {
+    fn build_of(
+        &mut self,
+        steps: &[StepInMemory],
+        options: BuildOptions,
+        mut stages: Stages<'_>,
+    ) -> Result<JsBuilt, WebError> {
         let BuildOptions { config, cells, repair: level, units, metadata } = options;
-        let name = self.files.first().map(|file| file.name.clone()).unwrap_or_default();
-        let mesh = self.read(&config, cells, &mut stages)?;
-        let notes = mesh.notes.clone();
+        let name = steps.first().map(|step| step.name.clone()).unwrap_or_default();
+        let left_out = self.files.left_out();
+        let mesh = self.read(steps, &config, cells, &mut stages)?;
+        let mut notes = mesh.notes.clone();
+        if !left_out.is_empty() {
+            notes.push(format!("left out of the folder, for it is no mesh: {}", left_out.join(", ")));
+        }
         stages.begin("repair")?;
         let (mut mesh, repaired) = if mesh.tets.is_empty() {
             expect_points(&mesh, &config, &name)?;
@@ -242,16 +234,16 @@ impl MeshBuilder {
         Ok(result(&bytes, &config, &built.summary, said))
     }
 
-    /// The mesh as the files have it. Each file is dropped when it was read.
+    /// The mesh as the files have it. Each file is dropped when no later step needs it.
     fn read(
         &mut self,
+        steps: &[StepInMemory],
         config: &BuildConfig,
         cells: bool,
         stages: &mut Stages<'_>,
     ) -> Result<TetMesh, WebError> {
-        let files = std::mem::take(&mut self.files);
-        let steps: Vec<_> = files.iter().map(|file| (file.name.clone(), None)).collect();
-        let mut files: Vec<_> = files.into_iter().map(Some).collect();
+        let mut files = std::mem::take(&mut self.files);
+        let named: Vec<_> = steps.iter().map(|step| (step.name.clone(), step.time)).collect();
         let total = steps.len() as u64;
         let cells = if cells || !config.preserve.is_empty() { CellData::Values } else { CellData::Names };
         let labels = &config.preserve;
@@ -259,11 +251,12 @@ impl MeshBuilder {
         let memory = MemoryLimit::of(self.memory);
         let mut read = |number: usize, options: &ReadOptions| {
             let options = &ReadOptions { memory: memory.clone(), ..options.clone() };
-            let file = files.get_mut(number).and_then(Option::take).unwrap_or_default();
             stages.count("parse", number as u64, total);
-            file.read(options)
+            let read = files.read(&steps[number], options);
+            files.keep(&steps[number + 1..]);
+            read
         };
-        let mesh = read_time_steps(&steps, &wanted, &mut read)?;
+        let mesh = read_time_steps(&named, &wanted, &mut read)?;
         if stages.stopped { Err(BuildError::Stopped.into()) } else { Ok(mesh) }
     }
 }
@@ -497,15 +490,6 @@ fn object(described: &impl Serialize) -> JsValue {
 
 fn no_file() -> WebError {
     WebError::new("bad-source", "no file is given".to_owned())
-}
-
-fn too_large(name: &str, bytes: u64, memory: u64) -> WebError {
-    let [bytes, memory] = [bytes, memory].map(megabytes);
-    let remedy = "use the command `tetralod build`";
-    WebError::new(
-        "memory",
-        format!("{name}: the files have {bytes} MB, but there are {memory} MB of memory; {remedy}"),
-    )
 }
 
 fn no_memory(survey: &Survey, needed: u64, memory: u64) -> WebError {

@@ -27,7 +27,11 @@ impl Forecast {
         let values = points.saturating_mul(8).saturating_mul(fields);
         // Coordinates and indices are decoded as 64 bits each before they become those of the mesh.
         let mesh = points.saturating_mul(24).saturating_add(cells.saturating_mul(16));
-        let decoding = points.saturating_mul(24).max(cells.saturating_mul(72));
+        let mut decoding = points.saturating_mul(24).max(cells.saturating_mul(72));
+        if ["nrrd", "metaimage"].contains(&survey.format) {
+            // All values of a sample are unpacked and decoded, whichever of them are wanted.
+            decoding = decoding.max(points.saturating_mul(16).saturating_mul(survey.fields.len() as u64));
+        }
         let reading = [files, mesh, values, decoding, FIXED];
         let construction = options.config.construction;
         let building = [memory_needed(construction, points, cells, fields), FIXED];

@@ -10,8 +10,10 @@ import {
   type BuildProgress,
   type BuildReport,
   type InputField,
+  type InputFormat,
   type InputInfo,
   type MeshSource,
+  type NamedFile,
   type RepairReport,
 } from "tetralod/build";
 
@@ -70,8 +72,11 @@ const examples: Examples<BuildOptions> = {
 
 /** Builds with each option. */
 export async function checkBuild(): Promise<void> {
-  const source: MeshSource = new Blob([GRID]);
-  const info: InputInfo = await inspect(source);
+  const named: NamedFile = { name: "grid.vtk", data: new Blob([GRID]) };
+  const source: MeshSource = named;
+  const info: InputInfo = await inspect([source]);
+  const format: InputFormat = info.format;
+  if (format !== "vtk") throw new Error("this is not its format");
   const field: InputField | undefined = info.fields[0];
   if (field?.name !== "p" || !info.memory.fits || info.bounds?.[3] !== 3) throw new Error("this is not what is in the file");
   for (const options of Object.values(examples)) {

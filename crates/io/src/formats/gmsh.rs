@@ -5,10 +5,8 @@
 //! The numbers of geometric entities become the field `entity` at cells, those of physical groups `physical`, with their names.
 
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::Read;
-use std::path::Path;
 
+use crate::beside::FilesOf;
 use crate::error::{At, ReadError, ReadReason, shown};
 use crate::formats::gmsh_layout::{Layout, Numbers, Version};
 use crate::formats::gmsh_mesh::Mesh;
@@ -49,18 +47,12 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     mesh.finish()
 }
 
-/// The times of the steps in the file at `path`; none if it is of another format. That it cannot be read is for the reader to say.
-pub(super) fn times_at(path: &Path) -> Vec<f64> {
-    let mut head = Vec::new();
-    let Ok(mut file) = File::open(path) else { return Vec::new() };
-    let is_read = |result: std::io::Result<usize>| result.is_ok();
-    if !is_read(file.by_ref().take(64).read_to_end(&mut head)) || !is_first(&head) {
+/// The times of the steps in the given file; none if it is of another format. That it cannot be read is for the reader to say.
+pub(super) fn times(files: &FilesOf<'_>) -> Vec<f64> {
+    if !is_first(&files.head(64)) {
         return Vec::new();
     }
-    if !is_read(file.read_to_end(&mut head)) {
-        return Vec::new();
-    }
-    gmsh_views::times(&head)
+    files.load_given().map_or_else(|_| Vec::new(), |bytes| gmsh_views::times(&bytes))
 }
 
 /// Whether a file of this format begins with these bytes.

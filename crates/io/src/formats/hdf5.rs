@@ -2,14 +2,14 @@
 //!
 //! Files on disk are read by ranges, never as a whole. What a read may allocate follows from the size of the file.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use hdf5_reader::storage::DynStorage;
 use hdf5_reader::{BlockCacheStorage, BytesStorage, FileStorage, Hdf5File, OpenOptions};
 use netcdf_reader::{NcFile, NcOpenOptions};
 
-use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::beside::{FilesOf, Source};
+use crate::error::{At, ReadError, in_file};
 use crate::formats::hdf5_values::{netcdf_reason, reason};
 use crate::formats::{exodus, vtkhdf};
 use crate::{ReadOptions, foreign};
@@ -53,38 +53,34 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     read_from(Arc::new(BytesStorage::new(bytes.to_vec())), options)
 }
 
-/// The file at `path` if it is one of these.
-fn open(path: &Path) -> Result<Option<DynStorage>, ReadReason> {
-    let Ok(file) = FileStorage::open(path) else { return Ok(None) };
-    let file: DynStorage = Arc::new(file);
-    let length = file.len().min(HDF5.len() as u64) as usize;
-    let start = file.read_range(0, length).map_err(reason)?;
-    if !is_known(&start) {
-        return Ok(None);
+/// The given file if it is one of these.
+fn open(files: &FilesOf<'_>) -> Option<DynStorage> {
+    if !is_known(&files.head(HDF5.len())) {
+        return None;
     }
-    Ok(Some(Arc::new(BlockCacheStorage::with_defaults(file))))
-}
-
-/// Reads the file at `path` if it is one of these; others are for other readers, and so is one that cannot be opened.
-pub(crate) fn read_at(path: &Path, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
-    let result = match open(path) {
-        Ok(None) => return None,
-        Ok(Some(storage)) => read_from(storage, options),
-        Err(reason) => Err(reason).at(String::new),
-    };
-    Some(result.map_err(|error| in_file(error, &path.display().to_string())))
-}
-
-/// The times of the steps in the file at `path`; none if it is not one of these, or has no steps.
-pub(crate) fn times_at(path: &Path) -> Result<Vec<f64>, ReadError> {
-    let times = open(path).at(String::new).and_then(|storage| {
-        match storage.map(|storage| content(storage, u64::MAX)).transpose()? {
-            Some(Content::Vtkhdf(file)) => vtkhdf::times(&file),
-            Some(Content::Exodus(file)) => exodus::times(&file),
-            None => Ok(Vec::new()),
+    Some(match files.source {
+        Source::Disk => {
+            Arc::new(BlockCacheStorage::with_defaults(Arc::new(FileStorage::open(files.given).ok()?)))
         }
+        Source::Memory(in_memory, given) => Arc::new(BytesStorage::from_owner(in_memory.shared(given))),
+        Source::Bytes(bytes) => Arc::new(BytesStorage::new(bytes.to_vec())),
+    })
+}
+
+/// Reads the given file if it is one of these; others are for other readers, and so is one that cannot be opened.
+pub(crate) fn read_given(files: &FilesOf<'_>, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    let result = read_from(open(files)?, options);
+    Some(result.map_err(|error| in_file(error, &files.name())))
+}
+
+/// The times of the steps in the given file; none if it is not one of these, or has no steps.
+pub(crate) fn times(files: &FilesOf<'_>) -> Result<Vec<f64>, ReadError> {
+    let Some(storage) = open(files) else { return Ok(Vec::new()) };
+    let times = content(storage, u64::MAX).and_then(|content| match content {
+        Content::Vtkhdf(file) => vtkhdf::times(&file),
+        Content::Exodus(file) => exodus::times(&file),
     });
-    times.map_err(|error| in_file(error, &path.display().to_string()))
+    times.map_err(|error| in_file(error, &files.name()))
 }
 
 fn read_from(storage: DynStorage, options: &ReadOptions) -> Result<TetMesh, ReadError> {

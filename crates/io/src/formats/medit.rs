@@ -7,6 +7,7 @@ use crate::error::{At, ReadError, ReadReason, in_file, shown};
 use crate::fields::in_order;
 use crate::formats::draft::Draft;
 use crate::formats::medit_cells::{Cells, KINDS, expect_known, ordering};
+use crate::memory::FileBytes;
 use crate::number::NumberType;
 use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
@@ -133,13 +134,21 @@ pub(super) fn read(
     let mut parts = Parts::new(options);
     let read = read_sections(&mut file, &mut parts);
     read.at(|| file.line_number())?;
-    // A mesh need not have one.
-    if let Ok(bytes) = beside(solution) {
+    if let Some(bytes) = beside_if(beside, solution).in_file(solution)? {
         let mut file = Scanner::with_comments(&bytes);
         let read = read_sections(&mut file, &mut parts);
         read.at(|| file.line_number()).map_err(|error| in_file(error, solution))?;
     }
     parts.finish().at(String::new)
+}
+
+/// The file with the solution; a mesh need not have one.
+pub(super) fn beside_if<'a>(beside: Beside<'a>, solution: &str) -> Result<Option<FileBytes<'a>>, ReadReason> {
+    match beside(solution) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(reason @ (ReadReason::SeveralGiven(_) | ReadReason::Memory { .. })) => Err(reason),
+        Err(_) => Ok(None),
+    }
 }
 
 /// Reads the sections of a mesh or of a solution.

@@ -4,7 +4,7 @@
 use std::ops::RangeInclusive;
 
 use crate::error::{At, ReadError, ReadReason, in_file};
-use crate::formats::medit::{FLAT, Layout, Numbers, Parts, expect_three};
+use crate::formats::medit::{FLAT, Layout, Numbers, Parts, beside_if, expect_three};
 use crate::formats::medit_cells::{expect_known, refused};
 use crate::number::NumberType;
 use crate::scanner::Scanner;
@@ -57,8 +57,7 @@ pub(super) fn read(
 ) -> Result<TetMesh, ReadError> {
     let mut parts = Parts::new(options);
     read_sections(bytes, &mut parts)?;
-    // A mesh need not have one.
-    if let Ok(bytes) = beside(solution) {
+    if let Some(bytes) = beside_if(beside, solution).in_file(solution)? {
         read_sections(&bytes, &mut parts).map_err(|error| in_file(error, solution))?;
     }
     parts.finish().at(String::new)

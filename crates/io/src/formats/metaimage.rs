@@ -41,6 +41,13 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
     volume.mesh(&samples, options).at(|| "samples".into())
 }
 
+/// The names of the files with the samples.
+pub(super) fn named_by(bytes: &[u8]) -> Vec<String> {
+    let names =
+        read_header(bytes).and_then(|(header, rest)| header.files(rest, three(&header.size, "DimSize")?));
+    names.unwrap_or_default()
+}
+
 /// What a header says.
 #[derive(Default)]
 struct Header {

@@ -1,4 +1,4 @@
-//! Formats of meshers, of imaging and in HDF5, which only native programs read.
+//! Formats of meshers, of imaging and in HDF5.
 //!
 //! Each is recognised by its first words, but for TetGen's, whose files are lists of numbers.
 
@@ -30,6 +30,7 @@ mod vtkhdf;
 
 use std::path::Path;
 
+use crate::beside::FilesOf;
 use crate::error::ReadError;
 use crate::scanner::Scanner;
 use crate::{Beside, ReadOptions};
@@ -81,14 +82,8 @@ impl Format {
     }
 }
 
-/// Whether these formats are read.
-const IS_NATIVE: bool = cfg!(not(target_arch = "wasm32"));
-
 /// What the format of these bytes is called, if it is one of these.
 pub(super) fn name(bytes: &[u8]) -> Option<&'static str> {
-    if !IS_NATIVE {
-        return None;
-    }
     #[cfg(feature = "hdf5")]
     if let Some(name) = hdf5::name(bytes) {
         return Some(name);
@@ -103,9 +98,6 @@ pub(super) fn read(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Option<Result<TetMesh, ReadError>> {
-    if !IS_NATIVE {
-        return None;
-    }
     #[cfg(feature = "hdf5")]
     if hdf5::is_known(bytes) {
         return Some(hdf5::read(bytes, options));
@@ -120,20 +112,31 @@ pub(super) fn read(
     })
 }
 
-/// The times of the steps in the file at `path`; fewer than two if it is of no format that is known to have some.
-pub(super) fn times_at(path: &Path) -> Result<Vec<f64>, ReadError> {
+/// The times of the steps in the given file; fewer than two if it is of no format that is known to have some.
+pub(super) fn times(files: &FilesOf<'_>) -> Result<Vec<f64>, ReadError> {
     #[cfg(feature = "hdf5")]
     {
-        let times = hdf5::times_at(path)?;
+        let times = hdf5::times(files)?;
         if !times.is_empty() {
             return Ok(times);
         }
     }
-    Ok(gmsh::times_at(path))
+    Ok(gmsh::times(files))
+}
+
+/// The names of the files that one called `name` needs, or may have beside it. What is wrong with it is for its reader to say.
+pub(super) fn named_by(name: &str, bytes: &[u8]) -> Vec<String> {
+    match Format::of(bytes) {
+        Some(Format::Medit) => vec![sibling(name, "sol")],
+        Some(Format::MeditBinary) => vec![sibling(name, "solb")],
+        Some(Format::Nrrd) => nrrd::named_by(bytes),
+        Some(Format::MetaImage) => metaimage::named_by(bytes),
+        Some(Format::Gmsh | Format::Netgen) | None => Vec::new(),
+    }
 }
 
 /// The name of the file beside the one called `name` that has another ending.
-fn sibling(name: &str, ending: &str) -> String {
+pub(super) fn sibling(name: &str, ending: &str) -> String {
     let path = Path::new(name).with_extension(ending);
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

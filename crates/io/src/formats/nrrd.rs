@@ -62,6 +62,11 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
     volume.mesh(&samples, options).at(|| "samples".into())
 }
 
+/// The names of the files with the samples.
+pub(super) fn named_by(bytes: &[u8]) -> Vec<String> {
+    read_header(bytes).map_or_else(|_| Vec::new(), |(header, _)| header.files)
+}
+
 /// The header, which an empty line ends, and what follows.
 fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), ReadReason> {
     let (mut header, mut lines) = (Header::default(), Scanner::new(bytes));

@@ -15,9 +15,15 @@ use crate::formats::medit_cells;
 use crate::scanner::{Scanner, parsed};
 use tetralod::mesh::TetMesh;
 
-/// Reads the two files of which `path` is one.
-pub(crate) fn read(files: &FilesOf<'_>, path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let [nodes, cells] = ["node", "ele"].map(|ending| path.with_extension(ending));
+/// What the survey of a mesh calls the format.
+pub(crate) const NAME: &str = "tetgen";
+
+/// The endings of the names of files that belong to the one with the points; all but the first say nothing that is read.
+pub(crate) const BESIDE_NODES: [&str; 6] = ["ele", "face", "edge", "neigh", "smesh", "poly"];
+
+/// Reads the two files of which one is given.
+pub(crate) fn read(files: &FilesOf<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let [nodes, cells] = ["node", "ele"].map(|ending| files.given.with_extension(ending));
     let name = |path: &Path| path.display().to_string();
     let (node_bytes, cell_bytes) = (files.load_one(&nodes)?, files.load_one(&cells)?);
     let mut draft = Draft::new(options);

@@ -106,6 +106,7 @@ impl Volume {
             let of_array = in_order(&values, self.components() as usize, &array.components);
             fields.fill(claim, of_array, self.number.is_integer(), &self.unit)?;
         }
+        fields.others.iter_mut().for_each(|field| field.unit.clone_from(&self.unit));
         let others = [fields.others, Vec::new()];
         let values = GridValues { fields: fields.fields, others, ..GridValues::default() };
         let mesh = Placement { dims: self.dims, origin: self.origin, steps: self.steps }

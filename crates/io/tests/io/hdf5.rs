@@ -192,7 +192,7 @@ fn assert_harmless(name: &str, result: Result<TetMesh, ReadError>) -> bool {
     true
 }
 
-fn files() -> Vec<(&'static str, Vec<u8>)> {
+pub fn files() -> Vec<(&'static str, Vec<u8>)> {
     let fixed = [PIECES, STEPS, IMAGE, NETCDF4].map(|(name, bytes)| (name, bytes.to_vec()));
     fixed.into_iter().chain([("1.exo", exodus(1)), ("5.exo", exodus(5))]).collect()
 }

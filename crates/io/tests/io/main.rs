@@ -10,6 +10,8 @@ mod fields;
 mod files;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(not(target_arch = "wasm32"))]
+mod in_memory;
 mod memory;
 #[cfg(not(target_arch = "wasm32"))]
 mod meshers;

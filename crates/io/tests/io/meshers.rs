@@ -3,25 +3,25 @@
 use std::fs;
 use tetralod_io as io;
 
-const TETGEN: [(&str, &str); 2] = [
+pub const TETGEN: [(&str, &str); 2] = [
     ("a.1.node", "4 3 1 0\n0 0 0 0 10\n1 1 0 0 20\n2 0 1 0 30\n3 0 0 1 40\n"),
     ("a.1.ele", "1 4 0\n0 0 1 2 3\n"),
 ];
-const MEDIT: [(&str, &str); 2] = [
+pub const MEDIT: [(&str, &str); 2] = [
     (
         "a.mesh",
         "MeshVersionFormatted 1\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n",
     ),
     ("a.sol", "MeshVersionFormatted 1\nDimension 3\nSolAtVertices 4\n1 1\n10 20 30 40\nEnd\n"),
 ];
-const META: [(&str, &str); 2] = [
+pub const META: [(&str, &str); 2] = [
     (
         "a.mhd",
         "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementSpacing = 1 1 2\nElementDataFile = a.zraw\n",
     ),
     ("a.zraw", "ABCDEFGH"),
 ];
-const NRRD: [(&str, &str); 2] = [
+pub const NRRD: [(&str, &str); 2] = [
     ("a.nhdr", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: a.raw\n\n"),
     ("a.raw", "ABCDEFGH"),
 ];

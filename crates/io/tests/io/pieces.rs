@@ -7,16 +7,16 @@ use tetralod::mesh::{Field, TetMesh};
 use tetralod_io as io;
 
 /// A folder that is gone with the test.
-struct Folder(PathBuf);
+pub struct Folder(pub PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("tetralod-{name}-{}", std::process::id()));
         std::fs::create_dir_all(path.join("parts")).unwrap();
         Self(path)
     }
 
-    fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
+    pub fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
         let path = self.0.join(name);
         std::fs::write(&path, bytes).unwrap();
         path
@@ -30,7 +30,7 @@ impl Drop for Folder {
 }
 
 /// Cubes with their lower corner at these places, as hexahedra; their points come in another order in each file.
-fn cubes(places: &[[f64; 3]], turn: usize) -> Vec<u8> {
+pub fn cubes(places: &[[f64; 3]], turn: usize) -> Vec<u8> {
     let corners = [
         [0., 0., 0.],
         [1., 0., 0.],
@@ -71,7 +71,7 @@ fn cubes(places: &[[f64; 3]], turn: usize) -> Vec<u8> {
     xml(Style::PLAIN, "UnstructuredGrid", "", &[(attributes, arrays)])
 }
 
-fn list(sources: &[&str]) -> String {
+pub fn list(sources: &[&str]) -> String {
     let pieces: String = sources.iter().map(|source| format!("<Piece Source=\"{source}\"/>")).collect();
     format!(
         "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid GhostLevel=\"0\"><PPointData>\
@@ -125,7 +125,13 @@ fn pieces_that_cannot_be_read_are_named() {
 }
 
 /// The part of a sample grid between two indices along x, as a file of its type.
-fn slab(whole: &TetMesh, kind: &str, dims: [usize; 3], first: [i64; 3], [from, to]: [usize; 2]) -> Vec<u8> {
+pub fn slab(
+    whole: &TetMesh,
+    kind: &str,
+    dims: [usize; 3],
+    first: [i64; 3],
+    [from, to]: [usize; 2],
+) -> Vec<u8> {
     let inside = |i: &usize| (from..=to).contains(&(i % dims[0]));
     let points: Vec<usize> = (0..whole.positions.len()).filter(inside).collect();
     let values: Vec<f64> = points.iter().map(|&i| whole.fields[0].values[i]).collect();
@@ -153,7 +159,7 @@ fn slab(whole: &TetMesh, kind: &str, dims: [usize; 3], first: [i64; 3], [from, t
     xml(Style::PLAIN, kind, &dataset, &[(format!("Extent=\"{extent}\""), arrays)])
 }
 
-fn extent(dims: [usize; 3], first: [i64; 3], [from, to]: [usize; 2]) -> String {
+pub fn extent(dims: [usize; 3], first: [i64; 3], [from, to]: [usize; 2]) -> String {
     let ends = [[from, to], [0, dims[1] - 1], [0, dims[2] - 1]];
     let words: Vec<String> =
         (0..3).flat_map(|axis| ends[axis].map(|end| (first[axis] + end as i64).to_string())).collect();

@@ -11,10 +11,11 @@ fn described(fields: &[Field]) -> Vec<(&str, &str, Option<&VectorPart>)> {
     fields.iter().map(|field| (field.name.as_str(), field.unit.as_str(), field.vector.as_ref())).collect()
 }
 
-fn assert_agrees(survey: &Survey, mesh: &TetMesh, name: &str) {
-    // Polyhedra may get points in their middle.
-    assert!(survey.points <= mesh.positions.len() as u64, "{name}");
-    assert!(survey.points == mesh.positions.len() as u64 || name.contains("polyhedra"), "{name}");
+pub fn assert_agrees(survey: &Survey, mesh: &TetMesh, name: &str) {
+    // Polyhedra may get points in their middle; points that several pieces have count in each.
+    let points = mesh.positions.len() as u64;
+    assert!(survey.points == points || name.contains("polyhedra") || survey.format == "pvtu", "{name}");
+    assert!(survey.points <= points || survey.format == "pvtu", "{name}");
     // Hexahedra with points that are the same become fewer tetrahedra.
     // Where bent faces of polyhedra get points in their middle, there are more.
     let part = if name.contains("polyhedra") { 3 } else { 1 };
@@ -39,10 +40,6 @@ fn of_every_format_and_encoding() {
         assert!(name.ends_with(survey.format), "{name} is {}", survey.format);
         assert!(!survey.fields.is_empty(), "{name}");
     }
-    let samples = numbers("UInt8", &grid_sample().fields[0].values, false);
-    let sidecar = sample_sidecar("uint8", "little");
-    let survey = io::survey_raw("a.json", sidecar.as_bytes()).unwrap();
-    assert_agrees(&survey, &io::read_raw("a.raw", sidecar.as_bytes(), &samples).unwrap(), "raw");
 }
 
 #[test]
