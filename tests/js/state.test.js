@@ -45,7 +45,7 @@ const seen = (page) =>
   page.evaluate(() => {
     const value = (control) => (["checkbox", "radio"].includes(control.type) ? control.checked : control.value);
     const all = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("#settings input, #settings select")]);
-    const controls = all.filter(({ id }) => !["split", "difference", "freeze"].includes(id));
+    const controls = all.filter(({ id }) => !["split", "difference", "freeze", "region-filter"].includes(id));
     const { request, viewer } = window.tetralodDemo;
     const words = [...document.querySelectorAll("#settings output:not(#transfer-chosen)")].map(({ textContent }) => textContent);
     return {
@@ -73,7 +73,7 @@ async function changeAll(page) {
   for (const which of controls) {
     const isChanged = await page.evaluate(([selector, i]) => {
       const control = /** @type {any} */ (document.querySelectorAll(selector)[i]);
-      if (!control || control.disabled || ["split", "difference", "freeze"].includes(control.id)) return false;
+      if (!control || control.disabled || ["split", "difference", "freeze", "region-filter"].includes(control.id)) return false;
       const tell = (name) => control.dispatchEvent(new Event(name, { bubbles: true }));
       if (["checkbox", "radio"].includes(control.type)) control.click();
       else if (control instanceof HTMLSelectElement) {
