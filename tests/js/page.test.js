@@ -863,121 +863,45 @@ test("parts are hidden, shown alone and coloured, and a link shows the same", as
   await page.close();
 });
 
-/** A row of cubes of six tetrahedra, each a physical group of Gmsh with a name. @param {string[]} names */
-function rowOf(names) {
-  const points = Array.from({ length: 4 * (names.length + 1) }, (_, i) => [i >> 2, i & 1, (i >> 1) & 1]);
-  const steps = [
-    [1, 2],
-    [2, 4],
-    [4, 1],
-    [1, 4],
-    [4, 2],
-    [2, 1],
-  ];
-  // The first bit of a corner is along the row.
-  const corner = (k, bits) => 4 * (k + (bits & 1)) + (bits >> 1) + 1;
-  const path = ([a, b], i) => (i < 3 ? [0, a, a | b, 7] : [0, a | b, a, 7]);
-  const tets = names.flatMap((_, k) => steps.map((step, i) => [k + 1, path(step, i).map((bits) => corner(k, bits))]));
-  const list = (name, rows) => `$${name}\n${rows.join("\n")}\n$End${name}\n`;
-  return [
-    list("MeshFormat", ["2.2 0 8"]),
-    list("PhysicalNames", [names.length, ...names.map((name, i) => `3 ${i + 1} "${name}"`)]),
-    list("Nodes", [points.length, ...points.map((point, i) => `${i + 1} ${point.join(" ")}`)]),
-    list("Elements", [tets.length, ...tets.map(([group, corners], i) => `${i + 1} 4 2 ${group} 1 ${corners.join(" ")}`)]),
-    list("NodeData", [1, '"p"', 1, 0, 3, 0, 1, points.length, ...points.map(([x, y], i) => `${i + 1} ${x * x + y}`)]),
-  ].join("");
-}
-
-test("parts whose names have steps are a tree, which is filtered, made translucent, measured and refined", async () => {
-  const blades = Array.from({ length: 12 }, (_, i) => `rotor/blade ${i + 1}`);
-  const vanes = Array.from({ length: 12 }, (_, i) => `stator/vane ${i + 1}`);
-  const names = [...blades, "rotor/hub", ...vanes, "casing"];
-  const page = await open(SMALL, undefined, VIEWPORT);
+test("one sees through a part to those behind it, and each is measured and refined", async () => {
+  const page = await open("data/turbine.mt", undefined, VIEWPORT);
   await reach(page, "complete");
-  await page.evaluate(async (text) => {
-    const { build } = await import(String(new URL("pkg/build.js", location.href)));
-    const { bytes } = await build(new File([text], "row.msh"), { preserve: ["physical"] });
-    const dataTransfer = new DataTransfer();
-    dataTransfer.items.add(new File([bytes], "row.mt"));
-    for (const type of ["dragenter", "dragover", "drop"]) window.dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
-  }, rowOf(names));
-  await page.waitForFunction(() => window.tetralodDemo.info?.regions && window.tetralodDemo.state === "complete", undefined, { timeout: PATIENCE });
   const state = () => page.evaluate(() => window.tetralodDemo.viewer.state);
-  const has = async (wanted, of = async () => (await state()).regions ?? "all") => {
-    const found = async () => JSON.stringify(await of());
-    for (const until = Date.now() + PATIENCE; (await found()) !== JSON.stringify(wanted) && Date.now() < until; ) await page.waitForTimeout(50);
-    assert.deepEqual(await of(), wanted);
-  };
-  const but = (hidden) => names.filter((name) => !hidden.includes(name));
-  const box = (name) => page.getByRole("checkbox", { name, exact: true });
-  const mixed = (name) => box(name).evaluate((one) => one.indeterminate);
-  assert.equal(await page.locator("#region-list > li").count(), 3);
-  assert.ok(await box("rotor/hub").isHidden(), "branches of a long list are closed");
-  // By keys alone.
-  await box("rotor").focus();
-  for (const key of ["ArrowRight", "ArrowDown", "ArrowDown", "Space"]) await page.keyboard.press(key);
-  await has(but(["rotor/blade 2"]));
-  assert.deepEqual([await mixed("rotor"), await mixed("stator"), await box("stator").isChecked()], [true, false, true]);
-  await box("stator").uncheck();
-  await has(but(["rotor/blade 2", ...vanes]));
-  assert.ok(!(await mixed("stator")));
-  await box("rotor").click();
-  await has(but(vanes));
-  await page.getByRole("button", { name: "only stator" }).click();
-  await has(vanes);
-  await addressed(page, /hidden=0-12,25/);
-  await page.click("#all-regions");
-  await has("all");
-
-  await page.fill("#region-filter", "NE 1");
-  await box("stator/vane 11").waitFor({ timeout: PATIENCE });
-  assert.ok((await box("rotor").isHidden()) && (await page.innerText("#region-count")) === "4 of 26 parts");
-  await page.click("#only-found");
-  await has(vanes.filter((name) => name.includes("ne 1")));
-  await page.fill("#region-filter", "");
-  await page.click("#all-regions");
-  await has("all");
-
   await show(page, "Boundary");
+  await page.click("#all-regions");
   await page.selectOption("#boundary-colour", "region");
   await settle(page);
-  const opaque = await still(page, "tree-opaque");
+  const opaque = await still(page, "sheer-none");
   await page.getByRole("button", { name: "Opacities" }).click();
-  const sheer = async () => (await state()).boundary.regionOpacities ?? {};
-  await page.getByRole("slider", { name: "opacity of stator", exact: true }).fill("20");
-  await page.getByRole("slider", { name: "opacity of casing", exact: true }).fill("50");
-  await has({ ...Object.fromEntries(vanes.map((name) => [name, 0.2])), casing: 0.5 }, sheer);
-  await addressed(page, /part-opacities=13-24:20,25:50/);
+  for (const name of ["11", "12"]) await page.getByRole("slider", { name: `opacity of ${name}`, exact: true }).fill("20");
+  await addressed(page, /part-opacities=10-11:20/);
   await settle(page);
-  assert.ok(differing(opaque, await still(page, "tree-sheer")) > 0.01, "one sees through them");
-  const check = await checker(page);
-  for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
-    await page.emulateMedia({ colorScheme });
-    await check(`a tree of parts, ${colorScheme}`);
-    await screenshot(page, `page-tree-${colorScheme}`);
-  }
-  await page.getByRole("slider", { name: "opacity of stator", exact: true }).fill("100");
-  await has({ casing: 0.5 }, sheer);
-  await page.evaluate(() => (location.hash = "#view=solid&part-opacities=0-1:30,2:5"));
-  await has({ "rotor/blade 1": 0.3, "rotor/blade 2": 0.3, "rotor/blade 3": 0.05 }, sheer);
+  assert.deepEqual((await state()).boundary.regionOpacities, { 11: 0.2, 12: 0.2 });
+  const sheer = await still(page, "sheer-casing");
+  assert.ok(differing(opaque, sheer) > 0.05, "one sees through the casing");
+  await screenshot(page, "page-sheer");
+  const address = page.url();
+  await page.reload();
+  await reach(page, "complete");
+  await settle(page);
+  assert.equal(differing(sheer, await still(page, "sheer-reloaded")), 0, "a link shows the same");
+  assert.equal(page.url(), address);
 
   await page.selectOption("#region", "part");
-  await page.selectOption("#part", "stator/");
-  await has(vanes, async () => (await demo(page, "request")).regions);
-  await addressed(page, /region=part.*part=stator\/|part=stator\/.*region=part/);
-  await page.selectOption("#region", "");
-  await setSlider(page, "error", 0);
-
+  await page.selectOption("#part", "2");
+  assert.deepEqual((await demo(page, "request")).regions, ["2"]);
+  await settle(page);
   await press(page, "n");
   await measures(page);
-  const table = await page.locator("#part-stats tr").evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
-  assert.deepEqual(table[0].slice(0, 3), ["part", "tetrahedra", "volume"]);
-  assert.deepEqual(
-    table.slice(1).map(([name]) => name),
-    names,
-  );
-  for (const [, tetrahedra, volume] of table.slice(1)) assert.ok(tetrahedra === "6" && isNear(numberOf(volume), 1, 1e-3), `${tetrahedra} ${volume}`);
-  await check("a table of parts");
+  const rows = await page.locator("#part-stats tbody tr").evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
+  const { regions } = await demo(page, "info");
+  assert.equal(rows.length, regions.all.length);
+  for (const [i, [name, tetrahedra, volume]] of rows.entries()) {
+    assert.equal(name, regions.all[i].name);
+    assert.ok(isNear(numberOf(volume), regions.all[i].volume, 0.1) && numberOf(tetrahedra) <= regions.all[i].tetrahedra, `${tetrahedra} ${volume}`);
+  }
+  const errors = rows.map((row) => numberOf(row[7].replace(/e.*/, "")));
+  assert.ok(errors[1] < errors[10], "the hub alone is refined");
   await screenshot(page, "page-part-stats");
   assert.deepEqual(page.complaints, []);
   await page.close();
