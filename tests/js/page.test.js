@@ -790,7 +790,7 @@ test("any views are shown together, and what is beside the view stays when its s
 test("parts are hidden, shown alone and coloured, and a link shows the same", async () => {
   const page = await open("data/turbine.mt", undefined, VIEWPORT);
   await reach(page, "complete");
-  const boxes = page.locator("#region-list input");
+  const boxes = page.locator("#region-list [type=checkbox]");
   assert.equal(await boxes.count(), 12);
   const shown = () => page.evaluate(() => window.tetralodDemo.viewer.state.regions ?? "all");
   const has = async (wanted) => {
@@ -874,7 +874,7 @@ test("one sees through a part to those behind it, and each is measured and refin
   const opaque = await still(page, "sheer-none");
   await page.getByRole("button", { name: "Opacities" }).click();
   for (const name of ["11", "12"]) await page.getByRole("slider", { name: `opacity of ${name}`, exact: true }).fill("20");
-  await addressed(page, /part-opacities=10-11:20/);
+  await addressed(page, /part-opacities=10-11%3A20/);
   await settle(page);
   assert.deepEqual((await state()).boundary.regionOpacities, { 11: 0.2, 12: 0.2 });
   const sheer = await still(page, "sheer-casing");
