@@ -83,6 +83,8 @@ export function checkNames(scene: SceneState, volume: Volume) {
   if (problem) throw badOption("deform.field", problem);
   const region = scene.regions && noRegion(scene.regions, volume);
   if (region) throw badOption("regions", region);
+  const sheer = noRegion(Object.keys(scene.boundary?.regionOpacities ?? {}), volume);
+  if (sheer) throw badOption("boundary.regionOpacities", sheer);
 }
 
 /** Says what does not fit of a value; nothing where it does. */
@@ -140,6 +142,8 @@ export function fitScene(scene: SceneState, volume: Volume): { scene: SceneState
   fitted.slices &&= fitted.slices.filter((slice, i) => keep(`slices[${i}]`, meets(slice)));
   fitted.clips &&= fitted.clips.filter((clip, i) => keep(`clips[${i}]`, leaves(clip)));
   fitted.volume &&= only(fitted.volume, "volume", { opacities: values, points: values, unitLength: length });
+  const sheer: Judge = (opacities) => known(Object.keys(opacities));
+  fitted.boundary &&= only(fitted.boundary, "boundary", { regionOpacities: sheer });
   fitted.cells &&= only(fitted.cells, "cells", { cut: leaves });
   fitted.colours &&= only(fitted.colours, "colours", { range });
   /** Tubes or arrows, if the volume has their field. */

@@ -366,8 +366,8 @@ export interface Streamline {
   end: "boundary" | "stagnation" | "length" | "steps";
 }
 
-/** Sums over the mesh; exact for a field that is linear in each tetrahedron. */
-export interface FieldStats {
+/** Sums over tetrahedra; exact for a field that is linear in each. */
+export interface FieldSums {
   /** In model units, cubed. */
   volume: number;
   /** The field's integral, its mean and its standard deviation by volume, in field units. */
@@ -377,6 +377,20 @@ export interface FieldStats {
   /** Smallest and largest value. */
   min: number;
   max: number;
+}
+
+/** The same over a region. */
+export interface RegionStats extends FieldSums {
+  /** As in `info.regions`. */
+  name: string;
+  /** How many it has in the current mesh. */
+  tetrahedra: number;
+  /** The error of the field that is guaranteed in it, in field units, whatever was asked for. */
+  errorBound: number;
+}
+
+/** Sums over the mesh. */
+export interface FieldStats extends FieldSums {
   /** The volume of each bin of the histogram, and below the first and above the last one. */
   histogram: Float64Array;
   below: number;
@@ -385,6 +399,8 @@ export interface FieldStats {
   edges: Float64Array;
   /** The values below which the fractions of the volume lie that were asked for. */
   percentiles: Float64Array;
+  /** Of a volume with regions, those of which something is shown, in the order of `info.regions`. */
+  regions: RegionStats[] | undefined;
 }
 
 /** The work of a refinement, or of a step of one, and the quality of the mesh. */

@@ -50,6 +50,11 @@ export interface SliceState extends PlaneState {
 export interface BoundaryState {
   /** 0 to 1; 1 without it. */
   opacity?: number;
+  /**
+   * Regions with another opacity (`info.regions`), by their names or labels. Where a region is more opaque than one beside it, its interface
+   * with that is drawn, too: it is seen through the other.
+   */
+  regionOpacities?: Record<string, number>;
   /** Draws the edges of tetrahedra. */
   edges?: boolean;
   /** `"#rrggbb"`, in place of the colours of the values. */

@@ -188,7 +188,7 @@ export function report() {
     firstPicture: { milliseconds: demo.firstFrameMs, bytes: demo.firstFrameBytes },
     blocks: demo.blocks,
     traffic,
-    measures: measured(),
+    ...measured(),
     uploaded,
     gpuBytes,
     meshes,

@@ -51,7 +51,7 @@ import { attachPlanes } from "./planes.js";
 import { attachPlay } from "./play.js";
 import { Probes } from "./probes.js";
 import { attachRegion, boxWasDragged, useBox } from "./region.js";
-import { attachRegions } from "./regions.js";
+import { attachRegions } from "./regionlist.js";
 import { attachRequest } from "./request.js";
 import { attachScene, draw, showLegend } from "./scene.js";
 import { source } from "./source.js";

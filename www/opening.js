@@ -9,7 +9,7 @@ import { nameOf } from "./format.js";
 import { fail, hideMessage, note } from "./messages.js";
 import { showGrowth } from "./numbers.js";
 import { demo, viewer } from "./page.js";
-import { listRegions } from "./regions.js";
+import { listRegions } from "./regionlist.js";
 import { afterFirst, firstRequest, stopHolding } from "./request.js";
 import { fileNameIn, isNew, setOrigin, source, sourceOf } from "./source.js";
 import { carriedOver, store } from "./state.js";

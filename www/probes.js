@@ -15,7 +15,7 @@ import { curvesOverTime, hasTimes, plotOf, rowsOverTime } from "./overtime.js";
 import { demo, page, viewer, volume } from "./page.js";
 import { alongAlways, alongNow, angleOf, legsOf, lengthOf, NAMES } from "./path.js";
 import { heatPlot, linePlot } from "./plot.js";
-import { hideRegion, showOnly } from "./regions.js";
+import { numberOf, setHidden, showOnly } from "./regions.js";
 import { store } from "./state.js";
 import { AXES } from "./volume.js";
 
@@ -75,7 +75,7 @@ function partButtons({ region }) {
     made.addEventListener("click", () => act(region));
     return made;
   };
-  return [button("Hide this part", hideRegion), button("Show it alone", showOnly)];
+  return [button("Hide this part", (name) => setHidden([numberOf(name)], true)), button("Show it alone", (name) => showOnly([numberOf(name)]))];
 }
 
 export class Probes {

@@ -1,16 +1,17 @@
-/** The region of the request: a box with handles, the sphere in it, or the clip planes. */
+/** The region of the request: a box with handles, the sphere in it, a part, or the clip planes. */
 
 import { $, all } from "./dom.js";
 import { diagonalOf, precise } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
 import { planes } from "./planes.js";
+import { namesIn } from "./regions.js";
 import { store } from "./state.js";
 import { AXES, boxOf } from "./volume.js";
 
 /** @typedef {import("./volume.js").Box} Box */
 
-/** What the request says of it: one or several, all of which are refined. @returns {Partial<Pick<import("tetralod/viewer").ViewerRefineOptions, "box" | "sphere" | "slab">>[]} */
+/** What the request says of it: one or several, all of which are refined. @returns {Partial<Pick<import("tetralod/viewer").ViewerRefineOptions, "box" | "sphere" | "slab" | "regions">>[]} */
 export function areas() {
   const { box } = store.state;
   switch (store.state.region) {
@@ -18,6 +19,8 @@ export function areas() {
       return [{ box }];
     case "sphere":
       return [{ sphere: sphereIn(box) }];
+    case "part":
+      return [{ regions: namesIn(store.state.part) }];
     case "cut":
       return planes().map((slab) => ({ slab }));
     default:

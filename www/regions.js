@@ -1,16 +1,17 @@
-/** The parts of the volume, which files keep apart as regions: which of them are shown. */
+/** The parts of the volume, which files keep apart as regions: which of them are shown, how opaque they are, and which is refined. */
 
-import { $, element } from "./dom.js";
-import { count, grouped } from "./format.js";
-import { withUnit } from "./lengths.js";
 import { demo } from "./page.js";
-import { store } from "./state.js";
+import { nodesOf, treeOf } from "./regiontree.js";
+import { OPAQUE, store } from "./state.js";
 
 /** The regions of the volume that is open. */
-const regions = () => demo.info?.regions?.all ?? [];
+export const regions = () => demo.info?.regions?.all ?? [];
+
+/** Their names as a tree. */
+export const regionTree = () => treeOf(regions().map(({ name }) => name));
 
 /** Tells of a region whether it is hidden. */
-function hiddenOnes() {
+export function hiddenOnes() {
   const all = new Set(store.state.hidden);
   return (/** @type {number} */ i) => all.has(i);
 }
@@ -28,73 +29,50 @@ export function shownRegions() {
 /** Whether the boundary has the colours of the regions. */
 export const isByRegion = () => store.state["boundary-colour"] === "region" && regions().length > 0;
 
-/** @param {(i: number) => boolean} isHidden */
-const hide = (isHidden) =>
+/** Hides some regions, and shows the others. @param {(i: number) => boolean} isHidden */
+export const hide = (isHidden) =>
   store.change({
     hidden: regions()
       .map((_, i) => i)
       .filter(isHidden),
   });
 
+/** Hides some regions, or shows them; others stay. @param {readonly number[]} numbers @param {boolean} areHidden */
+export function setHidden(numbers, areHidden) {
+  const [isHidden, isOne] = [hiddenOnes(), new Set(numbers)];
+  hide((i) => (isOne.has(i) ? areHidden : isHidden(i)));
+}
+
+/** Hides all regions but some. @param {readonly number[]} numbers */
+export function showOnly(numbers) {
+  const isOne = new Set(numbers);
+  hide((i) => !isOne.has(i));
+}
+
 /** The region with a name, as others find it. @param {string} name */
-const numberOf = (name) => regions().findIndex((region) => region.name === name);
+export const numberOf = (name) => regions().findIndex((region) => region.name === name);
 
-/** Hides the region with a name, too. @param {string} name */
-export function hideRegion(name) {
-  const [number, isHidden] = [numberOf(name), hiddenOnes()];
-  hide((i) => i === number || isHidden(i));
+/** How opaque a region is, in percent of the boundary. @param {number} number */
+export const regionOpacity = (number) => store.state["part-opacities"][number] ?? OPAQUE;
+
+/** @param {readonly number[]} numbers @param {number} percent */
+export function setRegionOpacity(numbers, percent) {
+  const all = { ...store.state["part-opacities"] };
+  for (const number of numbers) {
+    if (percent === OPAQUE) delete all[number];
+    else all[number] = percent;
+  }
+  store.change({ "part-opacities": all });
 }
 
-/** Hides all regions but that with a name. @param {string} name */
-export function showOnly(name) {
-  const number = numberOf(name);
-  hide((i) => i !== number);
+/** What the boundary of the scene says of it, given its own opacity. @param {number} opacity */
+export function regionOpacities(opacity) {
+  const own = regions().flatMap(({ name }, number) => (regionOpacity(number) < OPAQUE ? [[name, (opacity * regionOpacity(number)) / OPAQUE]] : []));
+  return own.length > 0 ? { regionOpacities: Object.fromEntries(own) } : {};
 }
 
-/** The entry of a region. @param {import("tetralod").RegionInfo} region @param {number} number */
-function entry({ name, color, tetrahedra, volume }, number) {
-  const box = element("input", { type: "checkbox" });
-  box.addEventListener("change", () => {
-    const isHidden = hiddenOnes();
-    hide((i) => (i === number ? !box.checked : isHidden(i)));
-  });
-  const swatch = element("span", { className: "swatch" });
-  swatch.style.background = color;
-  const label = element("label", { title: `${name}: ${count(tetrahedra)} tetrahedra at full resolution, volume ${withUnit(grouped(volume), 3)}` });
-  label.append(box, swatch, element("span", {}, name));
-  const only = element("button", { type: "button", ariaLabel: `only ${name}` }, "only");
-  only.addEventListener("click", () => showOnly(name));
-  const item = element("li");
-  item.append(label, only);
-  return item;
-}
-
-/** Another file is shown. */
-export function listRegions() {
-  $("regions").hidden = regions().length < 2;
-  $("colour-by")
-    .querySelector("[value=region]")
-    ?.toggleAttribute("hidden", regions().length === 0);
-  $("region-list").replaceChildren(...regions().map(entry));
-  showRegions();
-}
-
-function showRegions() {
-  const boxes = /** @type {NodeListOf<HTMLInputElement>} */ ($("region-list").querySelectorAll("input"));
-  const isHidden = hiddenOnes();
-  boxes.forEach((box, i) => {
-    box.checked = !isHidden(i);
-  });
-  $("boundary-colour-row").hidden = store.state.view !== "solid" || regions().length === 0;
-}
-
-export function attachRegions() {
-  $("all-regions").addEventListener("click", () => hide(() => false));
-  $("other-regions").addEventListener("click", () => {
-    const isHidden = hiddenOnes();
-    hide((i) => !isHidden(i));
-  });
-  store.subscribe(["unit"], listRegions);
-  // Behind those that show and hide the settings of a view.
-  store.subscribe(["hidden", "view", "also", "opacities", "edges"], showRegions);
+/** The names of the regions of a part: a region, or a branch of the tree. @param {string} path */
+export function namesIn(path) {
+  const node = nodesOf(regionTree()).find((node) => node.path === path);
+  return (node?.numbers ?? []).map((number) => regions()[number].name);
 }

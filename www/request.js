@@ -12,7 +12,7 @@ import { FIRST, store } from "./state.js";
 /** What the request is made of. */
 const ASKED = /** @type {const} */ ([
   ...["refine", "error", "outside", "pixels", "budget", "focus", "isovalue", "field", "time"],
-  ...["region", "box", "view", "planes", "threshold", "over-time", "probes"],
+  ...["region", "part", "box", "view", "planes", "threshold", "over-time", "probes"],
 ]);
 
 /** Which place the slider of errors shows. */

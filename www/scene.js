@@ -14,7 +14,7 @@ import { fail } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
 import { beside, hasEdges, mode, opacityOf, shows } from "./parts.js";
 import { planes } from "./planes.js";
-import { isByRegion, shownRegions } from "./regions.js";
+import { isByRegion, regionOpacities, shownRegions } from "./regions.js";
 import { store } from "./state.js";
 import { background } from "./theme.js";
 import { threshold } from "./threshold.js";
@@ -48,6 +48,7 @@ export const LOOKS = /** @type {const} */ ([
     "colour-by",
     "boundary-colour",
     "hidden",
+    "part-opacities",
     "flow-colour",
     "rake",
     "arrows",
@@ -89,7 +90,8 @@ const PARTS = {
   solid() {
     if (mode() !== "solid") return { boundary: SHELL };
     const colourBy = isByRegion() ? { colourBy: /** @type {const} */ ("region") } : {};
-    return { boundary: { opacity: opacityOf("solid"), edges: hasEdges("solid"), ...colourBy }, clips: planes() };
+    const opacity = opacityOf("solid");
+    return { boundary: { opacity, edges: hasEdges("solid"), ...colourBy, ...regionOpacities(opacity) }, clips: planes() };
   },
   mesh() {
     const shape = /** @type {CellState["shape"]} */ (store.state.shape);

@@ -8,6 +8,7 @@ import { curveOf, curveWords } from "./curve.js";
 import { $, named } from "./dom.js";
 import { precise } from "./format.js";
 import { demo, page, volume } from "./page.js";
+import { nodesOf, treeOf } from "./regiontree.js";
 import { Store } from "./store.js";
 import { AXES, fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js";
 
@@ -51,6 +52,8 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
  * @property {[low: number, high: number] | undefined} threshold the values of the cells that are shown; all without it
  * @property {import("./curve.js").Curve} transfer
  * @property {readonly number[]} hidden the places of regions, in the list of the volume, that are not shown
+ * @property {Readonly<Record<number, number>>} part-opacities of regions, by their places in the list: in percent of that of the boundary
+ * @property {string} part the path of the region, or of the branch of regions, that is refined where that is asked for
  * @property {readonly Point[]} seeds that were placed by clicks
  * @property {readonly Point[]} probes
  * @property {Camera | undefined} camera that with which the volume is shown first without it
@@ -75,12 +78,15 @@ const SHEER = ["iso", "volume", "slice", "solid"];
 const EDGES = { iso: false, slice: true, solid: true, mesh: true };
 /** Edges are not drawn on a boundary that is shown first. @returns {Record<string, boolean>} */
 const firstEdges = () => ({ ...EDGES, solid: firstView() !== "solid" });
-const OPAQUE = 100;
+export const OPAQUE = 100;
 /** Of planes, in thousandths of the model's length. */
 export const MIDDLE = 500;
 export const MOST_PLANES = 6;
 /** Digits of numbers of the camera; those of the mesh's request have fewer, and are rounded before they are used. */
 const CAMERA_DIGITS = 9;
+
+/** Whether it is an opacity, in percent. @param {number} number */
+const isSheer = (number) => number >= 5 && number <= OPAQUE;
 
 /** @param {string} words */
 export const numbers = (words) => words.split(",").map(Number);
@@ -139,7 +145,7 @@ const number = (id) => ({
   },
 });
 
-/** A name from a list that the volume has, the default is its first. @param {"field" | "surface-colour" | "vector" | "deform"} id @param {() => string[]} names @returns {Entry} */
+/** A name from a list that the volume has, the default is its first. @param {"field" | "surface-colour" | "vector" | "deform" | "part"} id @param {() => string[]} names @returns {Entry} */
 const list = (id, names) => ({
   get: (state) => (state[id] === names()[0] ? "" : state[id]),
   set(words, draft) {
@@ -154,6 +160,8 @@ function firstFields() {
   return [name, ...fieldNames().filter((other) => other !== name)];
 }
 
+/** The paths of regions and of branches of them. */
+const partNames = () => nodesOf(treeOf((demo.info?.regions?.all ?? []).map(({ name }) => name))).map(({ path }) => path);
 const colourNames = () => ["", ...fieldNames()];
 const vectorNames = () => [...vectors().keys(), ""];
 const deformNames = () => ["", ...vectors().keys()];
@@ -250,7 +258,7 @@ const ENTRIES = {
     },
     set(words, draft) {
       const all = numbers(words);
-      const held = (/** @type {number} */ number) => (number >= 5 && number <= OPAQUE ? number : OPAQUE);
+      const held = (/** @type {number} */ number) => (isSheer(number) ? number : OPAQUE);
       const one = (/** @type {string} */ name) => (name === draft.view ? all[0] : OPAQUE);
       draft.opacities = Object.fromEntries(SHEER.map((name, i) => [name, held(all.length === SHEER.length ? all[i] : one(name))]));
       return true;
@@ -391,6 +399,29 @@ const ENTRIES = {
       return draft.hidden.length > 0 && runs.every((run) => run && Number(run[2] ?? run[1]) < count);
     },
   },
+  "part-opacities": {
+    // Runs of numbers with their opacities: "0-3:50,7:20".
+    get({ "part-opacities": all }) {
+      const numbers = Object.keys(all).map(Number);
+      const goesOn = (/** @type {number} */ a, /** @type {number} */ b) => all[a] === all[b] && b === a + 1;
+      const starts = numbers.filter((number, i) => i === 0 || !goesOn(numbers[i - 1], number));
+      const ends = numbers.filter((number, i) => i === numbers.length - 1 || !goesOn(number, numbers[i + 1]));
+      return starts.map((start, i) => `${start === ends[i] ? start : `${start}-${ends[i]}`}:${all[start]}`).join();
+    },
+    set(words, draft) {
+      const count = demo.info?.regions?.all.length ?? 0;
+      const runs = words.split(",").map((run) => /^(\d+)(?:-(\d+))?:(\d+)$/.exec(run));
+      const isRun = (/** @type {RegExpExecArray | null} */ run) => run !== null && Number(run[2] ?? run[1]) < count && isSheer(Number(run[3]));
+      /** @type {Record<number, number>} */
+      const all = {};
+      for (const run of runs.filter(isRun)) {
+        for (let number = Number(run?.[1]); number <= Number(run?.[2] ?? run?.[1]); number++) all[number] = Number(run?.[3]);
+      }
+      draft["part-opacities"] = all;
+      return runs.every(isRun);
+    },
+  },
+  part: list("part", partNames),
   seeds: places("seeds"),
   probes: places("probes"),
   "over-time": control("over-time"),
@@ -407,7 +438,7 @@ const ENTRIES = {
   },
 };
 
-/** What there is first of what no volume changes. @type {Omit<Others, "field" | "box">} */
+/** What there is first of what no volume changes. @type {Omit<Others, "field" | "box" | "part">} */
 export const FIRST = {
   view: /** @type {Mode} */ ("iso"),
   also: [],
@@ -425,6 +456,7 @@ export const FIRST = {
   threshold: undefined,
   transfer: curveOf(""),
   hidden: [],
+  "part-opacities": {},
   seeds: [],
   probes: [],
   camera: undefined,
@@ -432,7 +464,7 @@ export const FIRST = {
 
 /** The one that the page has. @type {Store<State>} */
 export const store = new Store(
-  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", box: [0, 0, 0, 1, 1, 1], playing: false, swinging: false, dark: true, kept: false }),
+  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", part: "", box: [0, 0, 0, 1, 1, 1], playing: false, swinging: false, dark: true, kept: false }),
   settled,
 );
 
@@ -445,6 +477,7 @@ function first() {
     edges: firstEdges(),
     field: firstFields()[0],
     vector: vectorNames()[0],
+    part: partNames()[0] ?? "",
     box: inner(),
   };
   return { ...store.state, ...loaded, ...FIRST, ...own, freeze, difference, split };
@@ -463,6 +496,7 @@ function settled(state) {
     also: state.also.every(canBe) ? state.also : state.also.filter(canBe),
     time: state.time < stepsOf(state.field).length ? state.time : 0,
     log,
+    region: state.region === "part" && !state.part ? "" : state.region,
     // No range of positive numbers has 0 in its middle.
     range: log && state.range === "symmetric" ? "data" : state.range,
   };
@@ -476,7 +510,7 @@ export function words() {
 
 /** What stays when another volume takes the place of one: all that has no place in its model. */
 export function carriedOver() {
-  const { camera, box, hidden, seeds, probes, time, unit, ...rest } = words();
+  const { camera, box, hidden, "part-opacities": opacities, part, seeds, probes, time, unit, ...rest } = words();
   return rest;
 }
 

@@ -365,7 +365,7 @@ fn rounded(by: f64) -> String {
 }
 
 /// Regions that are listed one by one for people.
-const LISTED: usize = 24;
+pub const LISTED: usize = 24;
 
 fn region_rows(regions: &Regions) -> Vec<(&str, String)> {
     let interfaces = match regions.deviation {

@@ -1,13 +1,16 @@
-//! `tetralod stats`: integral, mean and histogram of a field over the mesh.
+//! `tetralod stats`: integral, mean and histogram of a field over the mesh, and of each region.
 
+use super::info::LISTED;
 use super::parse::parse_numbers;
 use super::poly::write_table;
 use super::query::{Answer, Query};
+use super::usage::refuse_usage;
 use super::{files, input, output};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use tetralod::session::RegionStats;
 use tetralod::view::{FieldStats, Histogram};
 
 /// Computes the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
@@ -44,6 +47,19 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     reference: Option<Compared>,
     histogram: Bins,
+    /// Of a file that keeps regions apart, those that are shown.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    regions: Vec<Region>,
+}
+
+#[derive(Serialize)]
+struct Region {
+    name: String,
+    tetrahedra: u32,
+    #[serde(flatten)]
+    found: Numbers,
+    /// Of the field in this region, in its units.
+    error_bound: f64,
 }
 
 #[derive(Serialize)]
@@ -82,6 +98,20 @@ struct Sums {
     histogram: Histogram,
 }
 
+impl From<&FieldStats> for Numbers {
+    fn from(stats: &FieldStats) -> Self {
+        let [min, max] = stats.range();
+        Self {
+            volume: stats.volume(),
+            integral: stats.integral(),
+            mean: stats.mean(),
+            standard_deviation: stats.deviation(),
+            min,
+            max,
+        }
+    }
+}
+
 impl Sums {
     fn new(bins: u32, [low, high]: [f64; 2]) -> Self {
         Self { stats: FieldStats::default(), histogram: Histogram::new(low, high, bins as usize) }
@@ -91,18 +121,6 @@ impl Sums {
         self.stats.add(corners, values);
         self.histogram.add(corners, values);
     }
-
-    fn numbers(&self) -> Numbers {
-        let [min, max] = self.stats.range();
-        Numbers {
-            volume: self.stats.volume(),
-            integral: self.stats.integral(),
-            mean: self.stats.mean(),
-            standard_deviation: self.stats.deviation(),
-            min,
-            max,
-        }
-    }
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -111,7 +129,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let inputs = arguments.reference.iter().chain(arguments.query.files());
         files::check_output(path, inputs)?;
     }
-    let answer = arguments.query.answer()?;
+    if arguments.reference.is_some() && arguments.query.shown_regions().is_some() {
+        refuse_usage("--reference compares the whole volume: leave out --region");
+    }
+    let mut answer = arguments.query.answer()?;
     let field = &answer.opened.info()?.fields[answer.field];
     // A constant field is a range, too.
     let half = (1e-9 * field.min.abs()).max(0.5);
@@ -119,7 +140,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if field.min < field.max { [field.min, field.max] } else { [field.min - half, field.min + half] };
     let range = arguments.bin_range.unwrap_or(whole);
     let start = Instant::now();
-    let sums = of_mesh(&answer, Sums::new(arguments.bins, range))?;
+    let mut sums = Sums::new(arguments.bins, range);
+    let mesh = answer.opened.session.view();
+    sums.stats = FieldStats::of(&mesh);
+    sums.histogram.add_mesh(&mesh);
+    let regions = of_regions(&mut answer);
     let seconds = start.elapsed().as_secs_f64();
     let compare = |path: &Path| compare(path, &answer, &sums, Sums::new(arguments.bins, range));
     let reference = arguments.reference.as_deref().map(compare).transpose()?;
@@ -139,18 +164,23 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ];
         write_table(path, &table)?;
     }
-    let report = Report { found: sums.numbers(), reference, histogram: bins };
+    let report = Report { found: (&sums.stats).into(), reference, histogram: bins, regions };
     arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
 }
 
-/// Sums over the current mesh on its lattices, which double precision holds exactly.
-fn of_mesh(answer: &Answer, mut sums: Sums) -> Result<Sums> {
-    let info = answer.opened.info()?;
-    let mesh = answer.opened.session.mesh().context("there is no mesh")?;
-    let point = |v: u32| info.lattice.point(mesh.positions()[v as usize]);
-    let value = |v: u32| info.fields[answer.field].value(mesh.levels(v)[answer.field]);
-    mesh.tets().iter().for_each(|tet| sums.add(tet.map(point), tet.map(value)));
-    Ok(sums)
+/// The regions of the mesh that are shown.
+fn of_regions(answer: &mut Answer) -> Vec<Region> {
+    let session = &mut answer.opened.session;
+    let found = session.region_stats();
+    let (Some(regions), Some(info)) = (session.regions(), session.info()) else { return Vec::new() };
+    let range = info.fields[answer.field].range();
+    let one = |RegionStats { region, field, error }: &RegionStats| Region {
+        name: regions.all[usize::from(*region)].name.clone(),
+        tetrahedra: field.tetrahedra(),
+        found: field.into(),
+        error_bound: error * range,
+    };
+    found.iter().map(one).collect()
 }
 
 fn compare(path: &Path, answer: &Answer, sums: &Sums, mut reference: Sums) -> Result<Compared> {
@@ -168,7 +198,7 @@ fn compare(path: &Path, answer: &Answer, sums: &Sums, mut reference: Sums) -> Re
         let shares = sums.histogram.volumes().into_iter().chain([below, above]);
         shares.map(|share| share / volume).collect::<Vec<f64>>()
     });
-    let found = reference.numbers();
+    let found = Numbers::from(&reference.stats);
     Ok(Compared {
         volume_error: sums.stats.volume() - found.volume,
         integral_error: sums.stats.integral() - found.integral,
@@ -210,6 +240,24 @@ fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
     }
     if counts(*above) {
         rows.push(("above", share(*above)));
+    }
+    for Region { name, tetrahedra, found, error_bound } in report.regions.iter().take(LISTED) {
+        let tets = output::count(*tetrahedra);
+        let volume = output::number(found.volume);
+        let mean = output::within(found.mean, 1e-4 * (found.max - found.min));
+        let deviation = output::number(found.standard_deviation);
+        let ends = output::ends([found.min, found.max]).join(" to ");
+        let error = output::number(*error_bound);
+        rows.push((
+            "region",
+            format!("{name}: {tets} tetrahedra, volume {volume}, mean {mean}, deviation {deviation}, {ends}, within {error}"),
+        ));
+    }
+    if report.regions.len() > LISTED {
+        rows.push((
+            "",
+            format!("{} more: --json lists all", output::count((report.regions.len() - LISTED) as u32)),
+        ));
     }
     if let Some(path) = &arguments.output {
         rows.push(("file", path.display().to_string()));

@@ -158,10 +158,17 @@ pub fn boundary_faces<'a>(
     tets: &'a [[u32; 4]],
     neighbors: &'a [[u32; 4]],
 ) -> impl Iterator<Item = (u32, [u32; 3])> + 'a {
+    faces(tets, neighbors).filter(|(_, beside, _)| *beside == NONE).map(|(t, _, face)| (t, face))
+}
+
+/// All faces of tetrahedra, each with its tetrahedron and the neighbour there, or [`NONE`], counter-clockwise when seen from outside. Free
+/// slots have none.
+pub(crate) fn faces<'a>(
+    tets: &'a [[u32; 4]],
+    neighbors: &'a [[u32; 4]],
+) -> impl Iterator<Item = (u32, u32, [u32; 3])> + 'a {
     let live = (0..).zip(tets.iter().zip(neighbors)).filter(|(_, (tet, _))| tet[0] != NONE);
-    live.flat_map(|(t, (tet, around))| {
-        (0..4).filter(|&i| around[i] == NONE).map(move |i| (t, face_of(*tet, i)))
-    })
+    live.flat_map(|(t, (tet, around))| (0..4).map(move |i| (t, around[i], face_of(*tet, i))))
 }
 
 /// The error for a face with three or more tetrahedra.

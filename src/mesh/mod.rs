@@ -23,6 +23,7 @@ mod tet;
 mod tet_mesh;
 
 #[doc(hidden)]
+pub(crate) use adjacency::faces;
 pub use adjacency::{DisjointSets, FaceTable, Topology, boundary_faces, match_faces, neighbors, topology};
 #[doc(hidden)]
 pub use bit_set::BitSet;

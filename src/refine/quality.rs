@@ -124,6 +124,19 @@ impl Front {
         field.and_then(|field| by_field.get(field)).copied().unwrap_or(largest)
     }
 
+    /// The largest error that tetrahedra of each of so many regions have in one field.
+    pub fn errors_by_region(&self, mt: &impl ApplyUpdates, field: usize, regions: usize) -> Vec<ErrorCode> {
+        let to_come = to_come_by_field(mt);
+        let mut all = vec![ErrorCode::ZERO; regions];
+        for t in 0..self.mesh.tets().len() as u32 {
+            let (_, TetErrors { largest, by_field }) = self.errors_of(mt, t, &to_come);
+            let error = by_field.get(field).copied().unwrap_or(largest);
+            let most = &mut all[usize::from(self.mesh.region(t))];
+            *most = error.max(*most);
+        }
+        all
+    }
+
     /// For each tetrahedron of the mesh whether it may violate the last request only because data has not
     /// arrived: the update that removes it is not here, or, once the work is done as far as data allows, one
     /// that has to come before. None when all updates are here, and without a request.

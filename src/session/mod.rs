@@ -29,6 +29,7 @@ mod depths;
 mod first_picture;
 mod quantity;
 mod reading;
+mod region_stats;
 mod shown_tets;
 
 #[doc(hidden)]
@@ -40,6 +41,8 @@ pub use deformation::{Deformation, UnknownVector};
 pub use quantity::TetQuantity;
 #[doc(hidden)]
 pub use reading::Reading;
+#[doc(hidden)]
+pub use region_stats::RegionStats;
 
 use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError};
 use crate::geom::Bounds;

@@ -1,6 +1,6 @@
 //! The boundary of a mesh as a surface of its own.
 
-use crate::mesh::{NONE, boundary_faces};
+use crate::mesh::{NONE, boundary_faces, faces};
 use crate::view::MeshView;
 use glam::DVec3;
 
@@ -33,19 +33,23 @@ impl BoundarySurface {
     /// # Panics
     /// If the mesh names a point that it does not have.
     pub fn extract(&mut self, mesh: &MeshView<'_>) {
-        self.extract_of(mesh, |_| true);
+        self.take(mesh, boundary_faces(mesh.tets, mesh.neighbors).map(|(_, face)| face));
     }
 
-    /// [`Self::extract`] of the faces of some tetrahedra alone.
+    /// Replaces the surface by those faces of tetrahedra that are wanted, given the tetrahedron and its neighbour at the face, or [`NONE`].
     ///
     /// # Panics
     /// If the mesh names a point that it does not have.
-    pub fn extract_of(&mut self, mesh: &MeshView<'_>, is_wanted: impl Fn(u32) -> bool) {
+    pub fn extract_of(&mut self, mesh: &MeshView<'_>, is_wanted: impl Fn(u32, u32) -> bool) {
+        let faces = faces(mesh.tets, mesh.neighbors).filter(|(tet, beside, _)| is_wanted(*tet, *beside));
+        self.take(mesh, faces.map(|(_, _, face)| face));
+    }
+
+    fn take(&mut self, mesh: &MeshView<'_>, faces: impl Iterator<Item = [u32; 3]>) {
         self.indices.clear();
         self.points.clear();
         self.vertex_of.resize(mesh.positions.len(), NONE);
-        let faces = boundary_faces(mesh.tets, mesh.neighbors).filter(|(tet, _)| is_wanted(*tet));
-        for (_, face) in faces {
+        for face in faces {
             let triangle = face.map(|point| self.vertex(point));
             self.indices.push(triangle);
         }

@@ -6,6 +6,7 @@ use crate::view::MeshView;
 /// Volume and moments of a field, summed up over tetrahedra.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldStats {
+    tetrahedra: u32,
     volume: Sum,
     /// The first value. Sums are of differences from it: squares of values in a narrow range far from 0 have no digits for that.
     base: f64,
@@ -20,6 +21,7 @@ pub struct FieldStats {
 impl Default for FieldStats {
     fn default() -> Self {
         Self {
+            tetrahedra: 0,
             volume: Sum::default(),
             base: f64::NAN,
             unit: 0.0,
@@ -38,13 +40,24 @@ impl FieldStats {
     /// If the mesh names a point that it does not have.
     pub fn of(mesh: &MeshView<'_>) -> Self {
         let mut stats = Self::default();
-        each_tet(mesh, |corners, values| stats.add(corners, values));
+        each_tet(mesh, |_, corners, values| stats.add(corners, values));
         stats
+    }
+
+    /// The statistics of each of so many regions, given the region of each tetrahedron.
+    ///
+    /// # Panics
+    /// If the mesh names a point that it does not have, or a tetrahedron has no region, or one beyond `count`.
+    pub fn of_regions(mesh: &MeshView<'_>, regions: &[u16], count: usize) -> Vec<Self> {
+        let mut all = vec![Self::default(); count];
+        each_tet(mesh, |t, corners, values| all[usize::from(regions[t])].add(corners, values));
+        all
     }
 
     /// Adds a tetrahedron.
     pub fn add(&mut self, corners: [[f64; 3]; 4], values: [f64; 4]) {
         let volume = volume_of(corners);
+        self.tetrahedra += 1;
         if self.base.is_nan() {
             self.base = values[0];
         }
@@ -61,6 +74,11 @@ impl FieldStats {
         self.squares.add(volume * (part_sum * part_sum + squares) / 20.0);
         self.min = values.into_iter().fold(self.min, f64::min);
         self.max = values.into_iter().fold(self.max, f64::max);
+    }
+
+    /// How many tetrahedra there are.
+    pub fn tetrahedra(&self) -> u32 {
+        self.tetrahedra
     }
 
     /// The volume, in cubic model units.
@@ -115,13 +133,14 @@ impl Histogram {
     /// # Panics
     /// If the mesh names a point that it does not have.
     pub fn add_mesh(&mut self, mesh: &MeshView<'_>) {
-        each_tet(mesh, |corners, values| self.add(corners, values));
+        each_tet(mesh, |_, corners, values| self.add(corners, values));
     }
 }
 
-fn each_tet(mesh: &MeshView<'_>, mut see: impl FnMut([[f64; 3]; 4], [f64; 4])) {
-    for tet in mesh.tets.iter().filter(|tet| tet[0] != NONE) {
+/// Calls `see` with the place of each tetrahedron in the mesh, its corners and its values.
+fn each_tet(mesh: &MeshView<'_>, mut see: impl FnMut(usize, [[f64; 3]; 4], [f64; 4])) {
+    for (t, tet) in mesh.tets.iter().enumerate().filter(|(_, tet)| tet[0] != NONE) {
         let corners = tet.map(|v| mesh.positions[v as usize]);
-        see(corners, tet.map(|v| mesh.field[v as usize]));
+        see(t, corners, tet.map(|v| mesh.field[v as usize]));
     }
 }

@@ -13,6 +13,7 @@ const FIELDS = [0, 1, 2].flatMap((time) => [
   ...["velocity_x", "velocity_y", "velocity_z"].map((name) => component(name, time)),
 ]);
 
+/** @type {Record<string, any>} */
 const VOLUMES = {
   flow: { kind: "half-edge", vertices: 1000, tetrahedra: 5000, updates: 900, isBox: true, firstField: 0, bounds: [0, 0, 0, 2, 4, 8], fields: FIELDS },
   plain: {
@@ -26,6 +27,22 @@ const VOLUMES = {
     fields: [{ name: "density", unit: "", min: -2, max: 6, isovalue: 2, time: undefined }],
   },
 };
+
+const NAMES = [
+  ...Array.from({ length: 12 }, (_, i) => `rotor/blade ${i + 1}`),
+  "rotor/hub",
+  ...Array.from({ length: 12 }, (_, i) => `stator/vane ${i + 1}`),
+  "casing",
+];
+const REGIONS = NAMES.map((name, i) => ({
+  name,
+  labels: [i + 1],
+  tetrahedra: 100,
+  volume: i + 1,
+  color: `#${(100 + 5 * i).toString(16)}8080`,
+  bounds: [0, 0, 0, 1, 1, 1],
+}));
+VOLUMES.parts = { ...VOLUMES.plain, kind: "half-edge", isBox: false, regions: { arrays: ["part"], deviation: 0, all: REGIONS } };
 
 const HOME = { target: [1, 2, 4], distance: 20, yaw: -0.75, pitch: 0.12, projection: "perspective" };
 
@@ -70,7 +87,8 @@ export class Viewer extends EventTarget {
   }
 
   async open(source) {
-    this.info = VOLUMES[/plain/.test(source.name ?? source) ? "plain" : "flow"];
+    const [name] = /plain|parts/.exec(source.name ?? source) ?? ["flow"];
+    this.info = VOLUMES[name];
     this.state = { camera: HOME };
     this.overlay = OVERLAY;
     this.#tell("overlay", OVERLAY);
@@ -115,7 +133,20 @@ export class Viewer extends EventTarget {
   });
   pick = async (x, y) => this.reading([1 + x / 2, 2 + y / 2, 3]);
   line = async () => ({ at: [0, 1], values: [1, 2] });
-  stats = async ({ fractions = [] }) => ({ histogram: [1, 2, 3], percentiles: fractions.map((part) => 1 + part) });
+  stats = async ({ fractions = [] }) => ({
+    ...{ histogram: [1, 2, 3], percentiles: fractions.map((part) => 1 + part), volume: 351, mean: 1 },
+    regions: this.info.regions?.all.map(({ name, tetrahedra, volume }) => ({
+      name,
+      tetrahedra,
+      volume,
+      min: 0,
+      max: 2,
+      mean: 1,
+      deviation: 0.5,
+      errorBound: 0.01,
+    })),
+  });
+  surface = async () => ({ positions: [], values: [], indices: [] });
   pickRegion = async () => -1;
   pan = async () => {};
   keep = async () => {};

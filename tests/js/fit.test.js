@@ -73,6 +73,25 @@ test("regions that the volume does not have go, and those that it has stay", () 
   checkNames(scene, { ...volume, regions });
 });
 
+test("opacities of regions that the volume does not have go", () => {
+  const regions = { all: [{ name: "hub", labels: [2] }] };
+  for (const [regionOpacities, stays] of /** @type {const} */ ([
+    [{ hub: 0.2 }, true],
+    [{ 2: 0.2 }, true],
+    [{ hub: 0.2, casing: 0.5 }, false],
+  ])) {
+    const scene = { boundary: { opacity: 0.5, regionOpacities } };
+    const { scene: fitted, dropped } = fitScene(scene, { ...volume, regions });
+    assert.deepEqual(fitted, stays ? scene : { boundary: { opacity: 0.5 } });
+    assert.deepEqual(
+      dropped.map(({ part }) => part),
+      stays ? [] : ["boundary.regionOpacities"],
+    );
+    if (stays) checkNames(scene, { ...volume, regions });
+    else assert.throws(() => checkNames(scene, { ...volume, regions }), { code: "bad-option", message: /boundary\.regionOpacities.*no region "casing"/ });
+  }
+});
+
 test("a threshold stays where the volume has its field and a value in its range", () => {
   for (const threshold of [{ range: [0, 0.5], field: "p" }, { range: [5, 9] }]) {
     const scene = /** @type {any} */ ({ boundary: {}, threshold });

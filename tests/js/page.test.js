@@ -791,7 +791,7 @@ test("any views are shown together, and what is beside the view stays when its s
 test("parts are hidden, shown alone and coloured, and a link shows the same", async () => {
   const page = await open("data/turbine.mt", undefined, VIEWPORT);
   await reach(page, "complete");
-  const boxes = page.locator("#region-list input");
+  const boxes = page.locator("#region-list [type=checkbox]");
   assert.equal(await boxes.count(), 12);
   const shown = () => page.evaluate(() => window.tetralodDemo.viewer.state.regions ?? "all");
   const has = async (wanted) => {
@@ -860,6 +860,50 @@ test("parts are hidden, shown alone and coloured, and a link shows the same", as
   await page.evaluate(() => void (location.search = "?url=data/bucky-small.mt"));
   await reach(page, "complete");
   assert.ok(await page.locator("#regions").isHidden());
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("one sees through a part to those behind it, and each is measured and refined", async () => {
+  const page = await open("data/turbine.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  const state = () => page.evaluate(() => window.tetralodDemo.viewer.state);
+  await show(page, "Boundary");
+  await page.click("#all-regions");
+  await page.selectOption("#boundary-colour", "region");
+  await settle(page);
+  const opaque = await still(page, "sheer-none");
+  await page.getByRole("button", { name: "Opacities" }).click();
+  for (const name of ["11", "12"]) await page.getByRole("slider", { name: `opacity of ${name}`, exact: true }).fill("20");
+  await addressed(page, /part-opacities=10-11%3A20/);
+  await settle(page);
+  assert.deepEqual((await state()).boundary.regionOpacities, { 11: 0.2, 12: 0.2 });
+  const sheer = await still(page, "sheer-casing");
+  assert.ok(differing(opaque, sheer) > 0.05, "one sees through the casing");
+  await screenshot(page, "page-sheer");
+  const address = page.url();
+  await page.reload();
+  await reach(page, "complete");
+  await settle(page);
+  assert.equal(differing(sheer, await still(page, "sheer-reloaded")), 0, "a link shows the same");
+  assert.equal(page.url(), address);
+
+  await page.selectOption("#region", "part");
+  await page.selectOption("#part", "2");
+  assert.deepEqual((await demo(page, "request")).regions, ["2"]);
+  await settle(page);
+  await press(page, "n");
+  await measures(page);
+  const rows = await page.locator("#part-stats tbody tr").evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
+  const { regions } = await demo(page, "info");
+  assert.equal(rows.length, regions.all.length);
+  for (const [i, [name, tetrahedra, volume]] of rows.entries()) {
+    assert.equal(name, regions.all[i].name);
+    assert.ok(isNear(numberOf(volume), regions.all[i].volume, 0.1) && numberOf(tetrahedra) <= regions.all[i].tetrahedra, `${tetrahedra} ${volume}`);
+  }
+  const errors = rows.map((row) => numberOf(row[7].replace(/e.*/, "")));
+  assert.ok(errors[1] < errors[10], "the hub alone is refined");
+  await screenshot(page, "page-part-stats");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

@@ -52,6 +52,28 @@ test("a request for a region is coarse elsewhere, and one for all is one without
   assert.equal(all.stats.tetrahedra, whole.stats.tetrahedra);
 });
 
+test("statistics are told of each region, and add up", async () => {
+  await mt.refine({
+    needs: [
+      { error: "1%", regions: ["2"] },
+      { error: "20%", field: "temperature" },
+    ],
+  });
+  const { regions, volume, integral, min, max } = await mt.stats({ bins: 1 });
+  assert.ok(regions);
+  assert.deepEqual(
+    regions.map(({ name }) => name),
+    mt.info.regions?.all.map(({ name }) => name),
+  );
+  const sum = (key) => regions.reduce((all, region) => all + region[key], 0);
+  assert.ok(Math.abs(sum("volume") / volume - 1) < 1e-12 && Math.abs(sum("integral") / integral - 1) < 1e-12);
+  assert.deepEqual([Math.min(...regions.map((region) => region.min)), Math.max(...regions.map((region) => region.max))], [min, max]);
+  const [{ min: low, max: high }] = mt.info.fields;
+  const errors = regions.map(({ errorBound }) => errorBound / (high - low));
+  assert.ok(errors[1] <= 0.01 && errors.every((error) => error <= 0.2) && Math.max(...errors) > 0.01, String(errors));
+  for (const { tetrahedra, mean, deviation } of regions) assert.ok(tetrahedra > 0 && mean >= min && mean <= max && deviation >= 0);
+});
+
 test("what is no region is refused by its name", async () => {
   const refused = (regions) => ({ code: "bad-option", message: new RegExp(regions) });
   await assert.rejects(mt.refine({ error: 0, regions: ["stator"] }), refused("regions.*no region stator, only 1, 2, 3"));

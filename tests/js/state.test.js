@@ -45,7 +45,7 @@ const seen = (page) =>
   page.evaluate(() => {
     const value = (control) => (["checkbox", "radio"].includes(control.type) ? control.checked : control.value);
     const all = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("#settings input, #settings select")]);
-    const controls = all.filter(({ id }) => !["split", "difference", "freeze"].includes(id));
+    const controls = all.filter(({ id }) => !["split", "difference", "freeze", "region-filter"].includes(id));
     const { request, viewer } = window.tetralodDemo;
     const words = [...document.querySelectorAll("#settings output:not(#transfer-chosen)")].map(({ textContent }) => textContent);
     return {
@@ -73,7 +73,7 @@ async function changeAll(page) {
   for (const which of controls) {
     const isChanged = await page.evaluate(([selector, i]) => {
       const control = /** @type {any} */ (document.querySelectorAll(selector)[i]);
-      if (!control || control.disabled || ["split", "difference", "freeze"].includes(control.id)) return false;
+      if (!control || control.disabled || ["split", "difference", "freeze", "region-filter"].includes(control.id)) return false;
       const tell = (name) => control.dispatchEvent(new Event(name, { bubbles: true }));
       if (["checkbox", "radio"].includes(control.type)) control.click();
       else if (control instanceof HTMLSelectElement) {
@@ -324,6 +324,86 @@ test("what is done in the picture is part of the state: probes, seeds, and the c
       assert.deepEqual({ ...(await seen(page)), cards: wanted.cards }, wanted);
     }
   }
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("parts whose names have steps are a tree, which is filtered, made translucent, measured and refined", async () => {
+  const page = await open("?url=parts.mt");
+  const [blades, vanes] = ["rotor/blade", "stator/vane"].map((name) => Array.from({ length: 12 }, (_, i) => `${name} ${i + 1}`));
+  const names = [...blades, "rotor/hub", ...vanes, "casing"];
+  const state = () => page.evaluate(() => window.tetralodDemo.viewer.state);
+  const shown = async () => (await state()).regions ?? "all";
+  const sheer = async () => (await state()).boundary.regionOpacities ?? {};
+  const but = (hidden) => names.filter((name) => !hidden.includes(name));
+  const box = (name) => page.getByRole("checkbox", { name, exact: true });
+  const mixed = (name) => box(name).evaluate((one) => one.indeterminate);
+  assert.equal(await page.locator("#region-list > li").count(), 3);
+  assert.ok(await box("rotor/hub").isHidden(), "branches of a long list are closed");
+  // By keys alone.
+  await box("rotor").focus();
+  for (const key of ["ArrowRight", "ArrowDown", "ArrowDown", "Space"]) await page.keyboard.press(key);
+  assert.deepEqual(await shown(), but(["rotor/blade 2"]));
+  assert.deepEqual([await mixed("rotor"), await mixed("stator"), await box("stator").isChecked()], [true, false, true]);
+  await box("stator").uncheck();
+  assert.deepEqual([await shown(), await mixed("stator")], [but(["rotor/blade 2", ...vanes]), false]);
+  await box("rotor").click();
+  assert.deepEqual(await shown(), but(vanes), "what shows some shows all");
+  await page.getByRole("button", { name: "only stator", exact: true }).click();
+  assert.deepEqual(await shown(), vanes);
+  await rest(page);
+  assert.match(page.url(), /hidden=0-12,25(&|$)/);
+  await page.click("#all-regions");
+  assert.equal(await shown(), "all");
+
+  await page.fill("#region-filter", "NE 1");
+  assert.ok((await box("stator/vane 11").isVisible()) && (await box("rotor").isHidden()));
+  assert.equal(await page.innerText("#region-count"), "4 of 26 parts");
+  await page.click("#only-found");
+  assert.deepEqual(
+    await shown(),
+    vanes.filter((name) => name.includes("ne 1")),
+  );
+  await page.fill("#region-filter", "");
+  await page.click("#all-regions");
+
+  const slider = (name) => page.getByRole("slider", { name: `opacity of ${name}`, exact: true });
+  assert.ok(await slider("casing").isHidden());
+  await page.getByRole("button", { name: "Opacities" }).click();
+  await slider("stator").fill("20");
+  await slider("casing").fill("50");
+  assert.deepEqual(await sheer(), { ...Object.fromEntries(vanes.map((name) => [name, 0.2])), casing: 0.5 });
+  await rest(page);
+  assert.match(page.url(), /part-opacities=13-24%3A20,25%3A50/);
+  // Those of the whole boundary count, too.
+  await page.fill("#opacity", "50");
+  assert.equal((await sheer()).casing, 0.25);
+  await page.fill("#opacity", "100");
+  await slider("stator").fill("100");
+  assert.deepEqual(await sheer(), { casing: 0.5 });
+  await page.evaluate(() => (location.hash = "#part-opacities=0-1:30,2:5&region=part&part=stator/"));
+  await rest(page);
+  assert.deepEqual(await sheer(), { "rotor/blade 1": 0.3, "rotor/blade 2": 0.3, "rotor/blade 3": 0.05 });
+  const request = () => page.evaluate(() => window.tetralodDemo.request.regions);
+  assert.deepEqual(await request(), vanes);
+  await page.selectOption("#part", "casing");
+  assert.deepEqual(await request(), ["casing"]);
+  await page.evaluate(() => (location.hash = "#part-opacities=3:2,40:50&hidden=0"));
+  await rest(page);
+  assert.match(await page.innerText("#note"), /means nothing: part-opacities/);
+
+  await page.keyboard.press("n");
+  await page.locator("#part-stats td").first().waitFor();
+  const table = await page.locator("#part-stats tr").evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
+  assert.deepEqual(table[0].slice(0, 3), ["part", "tetrahedra", "volume"]);
+  assert.deepEqual(
+    table.slice(1),
+    names.map((name, i) => [name, "100", String(i + 1), "0", "2", "1", "0.5", "0.01"]),
+  );
+  // Another volume has no such parts.
+  await page.evaluate(() => (location.search = "?url=plain.mt"));
+  await complete(page);
+  assert.ok(await page.locator("#regions").isHidden());
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

@@ -10,6 +10,7 @@ mod kinds;
 mod network;
 mod parts;
 mod quantity;
+mod regions;
 mod states;
 #[cfg(feature = "http")]
 mod stream_faults;

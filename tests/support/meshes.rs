@@ -46,6 +46,23 @@ pub fn cube(n: u32, fields: &[fn([f64; 3]) -> f64]) -> TetMesh {
     blocks([n; 3], fields, |_| true)
 }
 
+/// The unit cube with fields `hilly` and `linear`, and labels `part` of its cells: two halves along x, 0 and 1, and a core that reaches into
+/// both, 5, from a third to two thirds along each axis. `n` is a multiple of 6.
+pub fn parted(n: u32) -> TetMesh {
+    let mut mesh = cube(n, &[hilly, linear]);
+    let middle = |tet: &[u32; 4]| {
+        let corners = tet.map(|v| mesh.positions[v as usize]);
+        [0, 1, 2].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / 4.0)
+    };
+    let label = |[x, y, z]: [f64; 3]| match [x, y, z].iter().all(|c| (c - 0.5).abs() < 1.0 / 6.0) {
+        true => 5.0,
+        false => f64::from(u8::from(x > 0.5)),
+    };
+    let labels = mesh.tets.iter().map(|tet| label(middle(tet))).collect();
+    mesh.cell_fields = vec![Field::new("part", labels)];
+    mesh
+}
+
 /// A shell between two spheres, cut at the planes of the axes: curved boundaries and sharp edges.
 pub fn bent(n: u32) -> TetMesh {
     let mut mesh = cube(n, &[hilly]);

@@ -1,16 +1,16 @@
 //! Promise: without any GPU a scene lists what is to be drawn, and who makes the edits of one list after the other has what a list
 //! from nothing makes.
 
-use crate::support::meshes::{built, cube, hilly, linear};
+use crate::support::meshes::{built, cube, hilly, linear, parted};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::LazyLock;
 use tetralod::format::{EncodeOptions, encode};
-use tetralod::mesh::Field;
+use tetralod::geom::Ray;
 use tetralod::mt::Mt;
 use tetralod::refine::Request;
 use tetralod::session::Session;
-use tetralod::view::{Triangles, region_color};
+use tetralod::view::{Triangles, area, is_closed, region_color};
 use tetralod_build::{BuildConfig, build};
 use tetralod_render::draw::{BoxLines, CellStyle, Colouring, Edit, Style};
 use tetralod_render::scene::{
@@ -248,19 +248,8 @@ fn what_comes_before_an_error_is_listed() {
 
 /// Two halves and a core that reaches into both, each a region.
 fn in_regions() -> Session {
-    let mut mesh = cube(6, &[hilly, linear]);
-    let middle = |tet: &[u32; 4]| {
-        let corners = tet.map(|v| mesh.positions[v as usize]);
-        [0, 1, 2].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / 4.0)
-    };
-    let label = |[x, y, z]: [f64; 3]| match [x, y, z].iter().all(|c| (c - 0.5).abs() < 0.17) {
-        true => 5.0,
-        false => f64::from(u8::from(x > 0.5)),
-    };
-    let labels = mesh.tets.iter().map(|tet| label(middle(tet))).collect();
-    mesh.cell_fields = vec![Field::new("part", labels)];
     let config = BuildConfig { preserve: vec!["part".into()], all_fields: true, ..BuildConfig::default() };
-    let mt = build(&mesh, &config).expect("a valid mesh").mt;
+    let mt = build(&parted(6), &config).expect("a valid mesh").mt;
     let mut session = Session::new();
     session.feed(&encode(&mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
     session
@@ -311,6 +300,77 @@ fn regions_that_are_not_shown_are_not_drawn() {
     list.set_state(unknown).expect("whether it is there depends on the volume");
     let problem = list.update(&mut session).changed.expect_err("there is no rotor").to_string();
     assert!(problem.contains("regions[0]") && problem.contains("0, 1, 5"), "{problem}");
+}
+
+/// What is drawn of a boundary with these opacities of regions: for each surface its opacity, its area and whether it is closed.
+fn sheer(session: &mut Session, opacities: &[(&str, f64)], more: SceneState) -> Vec<(f32, f64, bool)> {
+    let region_opacities = opacities.iter().map(|(name, opacity)| ((*name).to_owned(), *opacity)).collect();
+    let boundary = Some(BoundaryState { region_opacities, ..BoundaryState::default() });
+    let mut drawn = Drawn::default();
+    follow(&mut scene(&SceneState { boundary, ..more }), session, &mut drawn);
+    let one = |Surface { positions, triangles, style }: &Surface| {
+        (style.opacity, area(positions, triangles), is_closed(triangles))
+    };
+    drawn.surfaces.values().map(one).collect()
+}
+
+#[test]
+fn what_a_translucent_region_hides_is_drawn_as_a_whole() {
+    let mut session = in_regions();
+    session.refine(&Request::within(0.02)).expect("a valid MT");
+    let near = |found: &[(f32, f64, bool)], wanted: &[(f32, f64, bool)]| {
+        let is_same =
+            |a: &(f32, f64, bool), b: &(f32, f64, bool)| (a.0, a.2) == (b.0, b.2) && (a.1 - b.1).abs() < 1e-3;
+        assert!(
+            found.len() == wanted.len() && found.iter().zip(wanted).all(|(a, b)| is_same(a, b)),
+            "{found:?}"
+        );
+    };
+    let (half, whole) = (3.0, 6.0);
+    // The interface of half 0 with half 1 is the middle without the core, and with this its sides and its end in half 0.
+    let (between, of_core) = (1.0 - 1.0 / 9.0, 4.0 / 18.0 + 1.0 / 9.0);
+    let plain = SceneState::default;
+    near(&sheer(&mut session, &[], plain()), &[(1.0, whole, true)]);
+    near(&sheer(&mut session, &[("0", 1.0)], plain()), &[(1.0, whole, true)]);
+    let opaque = (1.0, half + between + of_core, true);
+    near(&sheer(&mut session, &[("0", 0.25)], plain()), &[(0.25, half, false), opaque]);
+    // Of two that are translucent, the interface is that of the more opaque one. The core is seen through both.
+    let core = (1.0, 6.0 / 9.0, true);
+    let denser = (0.5, half + between, false);
+    near(&sheer(&mut session, &[("1", 0.5), ("0", 0.25)], plain()), &[(0.25, half, false), denser, core]);
+    // What is cut open is closed by a section for each.
+    let clips = vec![PlaneState { normal: [0.0, 1.0, 0.0], offset: 0.5 }];
+    let cut = sheer(&mut session, &[("0", 0.25)], SceneState { clips, ..plain() });
+    let caps: Vec<_> = cut.iter().map(|(opacity, area, _)| (*opacity, *area, false)).take(2).collect();
+    near(&caps, &[(0.25, 0.5 - 1.0 / 18.0, false), (1.0, 0.5 + 1.0 / 18.0, false)]);
+    // Hidden ones hide nothing.
+    let regions = Some(vec![RegionName::Label(0), RegionName::Label(5)]);
+    let some = sheer(&mut session, &[("0", 0.25)], SceneState { regions, ..plain() });
+    near(&some, &[(0.25, half + between, false), core]);
+    let boundary =
+        BoundaryState { region_opacities: [("rotor".to_owned(), 0.5)].into(), ..BoundaryState::default() };
+    let unknown = SceneState { boundary: Some(boundary), ..plain() };
+    let problem = scene(&unknown).update(&mut session).changed.expect_err("there is no rotor").to_string();
+    assert!(problem.contains("boundary.regionOpacities") && problem.contains("0, 1, 5"), "{problem}");
+    let problem = scene(&unknown).update(&mut opened()).changed.expect_err("there are none").to_string();
+    assert!(problem.contains("not parted"), "{problem}");
+}
+
+#[test]
+fn what_is_transparent_is_not_under_the_pointer() {
+    let mut session = in_regions();
+    session.refine(&Request::within(0.0)).expect("a valid MT");
+    let ray = Ray { origin: [-2.0, 0.45, 0.52].into(), direction: [1.0, 0.0, 0.0].into() };
+    for (opacity, x) in [(1.0, 0.0), (0.25, 0.0), (0.0, 1.0 / 3.0)] {
+        let boundary = BoundaryState {
+            region_opacities: [("0".to_owned(), opacity)].into(),
+            ..BoundaryState::default()
+        };
+        let mut list = scene(&SceneState { boundary: Some(boundary), ..SceneState::default() });
+        follow(&mut list, &mut session, &mut Drawn::default());
+        let found = list.pick(&mut session, &ray).expect("something is there");
+        assert!((found[0] - x).abs() < 1e-4, "{opacity}: {found:?}");
+    }
 }
 
 #[test]

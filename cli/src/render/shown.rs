@@ -41,6 +41,9 @@ pub struct Shown {
     /// Opacity of isosurfaces, sections and boundary, 0 to 1 or with % [default: 1].
     #[arg(long, value_name = "O|O%", value_parser = parse_opacity, allow_hyphen_values = true)]
     opacity: Option<f64>,
+    /// Opacity of the boundary of one region of the file, by its name or else its label: what it hides is seen through it (repeatable).
+    #[arg(long = "region-opacity", value_name = "NAME=O|O%", value_parser = parse_region_opacity, allow_hyphen_values = true)]
+    region_opacities: Vec<(String, f64)>,
     /// Opacities of the volume: ascending values of the field, each with the opacity (0 to 1) of a tenth of
     /// the model's diagonal [default: that of --transfer with its colours, or from 0 to 0.5 over the range of
     /// the colours].
@@ -168,6 +171,13 @@ fn parse_opacity(text: &str) -> Result<f64, String> {
     if opacity <= 1.0 { Ok(opacity) } else { Err(format!("'{text}' is more than 1")) }
 }
 
+fn parse_region_opacity(text: &str) -> Result<(String, f64), String> {
+    // Names may have such a sign, too.
+    let (name, opacity) =
+        text.rsplit_once('=').ok_or("give the region and its opacity: NAME=O, such as casing=20%")?;
+    Ok((name.to_owned(), parse_opacity(opacity)?))
+}
+
 fn parse_shrink(text: &str) -> Result<f64, String> {
     let shrink = parse_share(text)?;
     if shrink <= 0.95 { Ok(shrink) } else { Err(format!("'{text}' is more than 0.95")) }
@@ -227,7 +237,7 @@ impl Shown {
             (Mode::Isosurface, has_surface),
             (Mode::Slice, !self.slices.is_empty()),
             (Mode::Volume, self.opacities.is_some()),
-            (Mode::Boundary, self.is_by_region()),
+            (Mode::Boundary, self.is_by_region() || !self.region_opacities.is_empty()),
             (Mode::Cells, has_cells && self.scene.is_none()),
         ];
         let wanted: Vec<Mode> = implied.into_iter().filter(|(_, is)| *is).map(|(mode, _)| mode).collect();
@@ -318,6 +328,7 @@ impl Shown {
             ),
             ("shrink", self.shrink.is_some() && state.cells.is_none(), "cells"),
             ("cut", self.cut.is_some() && state.cells.is_none(), "cells, wire or points"),
+            ("region-opacity", !self.region_opacities.is_empty() && state.boundary.is_none(), "boundary"),
             ("opacity", self.opacity.is_some() && !faces, "isosurface, slice or boundary"),
             ("colour-field", self.colour_field.is_some() && !coloured, "isosurface or slice"),
         ];
@@ -352,6 +363,9 @@ impl Shown {
         }
         if let (Some(boundary), true) = (&mut state.boundary, self.is_by_region()) {
             boundary.colour_by = ColourBy::Region;
+        }
+        if let Some(boundary) = &mut state.boundary {
+            boundary.region_opacities.extend(self.region_opacities.iter().cloned());
         }
         if !self.clips.is_empty() {
             state.clips = self.clips.iter().map(plane).collect();

@@ -305,6 +305,33 @@ fn a_scene_is_printed_and_read() {
     assert_eq!(a.differing(&b), 0);
 }
 
+/// The other parts are seen through the casing, which alone is drawn where they are hidden.
+#[test]
+fn a_translucent_region_shows_what_it_hides() {
+    let folder = Folder::new("sheer");
+    let [input, mt, out] = ["t.vtu", "t.mt", "t.png"].map(|name| folder.path(name));
+    good(&["generate", "turbine", "--size", "5", "-o", &input]);
+    good(&["build", &input, "--preserve", "part", "-o", &mt]);
+    let casing = ["--region-opacity", "11=20%", "--region-opacity", "12=0.2"];
+    let printed = json(&[&["render", &mt, "--print-scene"][..], &casing].concat());
+    assert_eq!(printed["boundary"]["regionOpacities"], serde_json::json!({ "11": 0.2, "12": 0.2 }));
+    let picture = |more: &[&str]| draw(&mt, &out, &[&["--colour-by", "region"], more].concat());
+    let (plain, sheer, both) = (picture(&[]), picture(&casing), picture(&["--opacity", "20%"]));
+    assert!(sheer.differing(&plain) > 0 && sheer.differing(&both) > 0);
+    let hidden = ["--region", "11", "--region", "12"];
+    let alone = picture(&[&hidden[..], &["--opacity", "20%"]].concat());
+    assert_eq!(picture(&[&hidden[..], &casing].concat()).differing(&alone), 0);
+    bad(1, &["render", &mt, "-o", &out, "--region-opacity", "stator=0.5"], &["no region stator", "1, 2, 3"]);
+    for wrong in ["11", "11=2", "11=x"] {
+        bad(2, &["render", &mt, "-o", &out, "--region-opacity", wrong], &["--region-opacity"]);
+    }
+    bad(
+        2,
+        &["render", &mt, "-o", &out, "--mode", "cells", "--region-opacity", "11=0.5"],
+        &["add the mode boundary"],
+    );
+}
+
 #[test]
 fn what_cannot_be_drawn_is_refused() {
     let (_folder, mt, out) = prepared("refused", 5);

@@ -277,4 +277,37 @@ fn statistics_are_those_of_the_box() {
     assert!(number(&coarse["reference"], "integral_error") != 0.0);
     bad(2, &["stats", &mt, "--bin-range", "5,2"], &["--bin-range"]);
     bad(2, &["stats", &mt, "--bins", "0"], &["--bins"]);
+    assert_eq!(report.get("regions"), None, "there are none");
+}
+
+#[test]
+fn statistics_of_regions_add_up_and_those_of_one_are_its_own() {
+    let folder = Folder::new("region-stats");
+    let [input, mt] = ["t.vtu", "t.mt"].map(|name| folder.path(name));
+    good(&["generate", "turbine", "--size", "5", "-o", &input]);
+    good(&["build", &input, "--all-fields", "--preserve", "part", "-o", &mt]);
+    let ask = |more: &[&str]| json(&[&["stats", &mt, "--field", "stress", "--json"], more].concat());
+    let whole = ask(&[]);
+    let regions = whole["regions"].as_array().expect("a list").clone();
+    assert_eq!(regions.len(), 12);
+    for key in ["volume", "integral", "tetrahedra"] {
+        let sum: f64 = regions.iter().map(|region| number(region, key)).sum();
+        assert!((sum - number(&whole, key)).abs() <= 1e-12 * sum.abs(), "{key}: {sum} {}", whole[key]);
+    }
+    let info = json(&["info", &mt, "--json"]);
+    for (region, stated) in regions.iter().zip(info["regions"]["all"].as_array().expect("a list")) {
+        assert_eq!((&region["name"], &region["tetrahedra"]), (&stated["name"], &stated["tetrahedra"]));
+        assert!((number(region, "volume") / number(stated, "volume") - 1.0).abs() < 1e-9, "{region}");
+    }
+    // What is asked for in one region is of that alone, the whole, too.
+    let hub = ask(&["--region", "2", "--error", "1%"]);
+    let [own] = &hub["regions"].as_array().expect("a list")[..] else { panic!("one region") };
+    for key in ["volume", "integral", "mean", "standard_deviation", "min", "max"] {
+        assert_eq!(own[key], hub[key], "{key}");
+    }
+    assert!(number(own, "error_bound") <= number(&hub, "error_bound"), "{hub}");
+    // Curved boundaries are within the error.
+    assert!((number(&hub, "volume") / number(&regions[1], "volume") - 1.0).abs() < 1e-2);
+    assert!(good(&["stats", &mt, "--region", "2"]).contains("2: "));
+    bad(2, &["stats", &mt, "--region", "2", "--reference", &input], &["--reference", "--region"]);
 }

@@ -105,7 +105,7 @@ macro_rules! mesh_tools {
                     )
                 }
 
-                /// Sums over the current mesh, a histogram by volume of so many bins from `low` to `high`, and the values below which these
+                /// Sums over the current mesh and its regions, a histogram by volume of so many bins from `low` to `high`, and the values below which these
                 /// fractions of the volume lie; NaN is the end of the field's range.
                 pub fn stats(
                     &mut self,
@@ -118,7 +118,7 @@ macro_rules! mesh_tools {
                     let info = &self.file.info()?.fields[field];
                     let low = if low.is_nan() { info.min } else { low };
                     let high = if high.is_nan() { info.min + info.range() } else { high };
-                    tools::stats(&self.file.session.view(), bins, [low, high], fractions)
+                    tools::stats(&mut self.file.session, bins, [low, high], fractions)
                 }
 
                 /// A hash of the current mesh, the same wherever the same request was made.

@@ -3,6 +3,7 @@
 use crate::arrays::{doubles, floats, integers, object, objects, set};
 use crate::stored::Stored;
 use js_sys::{Array, Object};
+use tetralod::session::{RegionStats, Session};
 use tetralod::view::{
     BoundarySurface, FieldStats, Histogram, IsoSurface, MeshView, Plane, Probe, Slice, Streamline,
     TraceOptions, Tracer,
@@ -129,10 +130,10 @@ pub fn streamlines(
     Ok(seeds.iter().map(line).collect::<Array>().unchecked_into())
 }
 
-/// Sums over `mesh`, a histogram by volume of so many bins from `low` to `high`, and the values below which these fractions of
-/// the volume lie.
+/// Sums over what a session shows and over each region of it, a histogram by volume of so many bins from `low` to `high`, and the values
+/// below which these fractions of the volume lie.
 pub fn stats(
-    mesh: &MeshView<'_>,
+    session: &mut Session,
     bins: u32,
     [low, high]: [f64; 2],
     fractions: &[f64],
@@ -142,26 +143,46 @@ pub fn stats(
         let problem = "must be two finite numbers, the smaller first, in 1 to 2^20 bins";
         return Err(WebError::bad_option("range", problem));
     }
-    let stats = FieldStats::of(mesh);
+    let found = session.region_stats();
+    let regions = session.regions().map_or(&[][..], |regions| &regions.all);
+    let range = session.info().map_or(0.0, |info| info.fields[session.field()].range());
+    let of_region = |RegionStats { region, field, error }: &RegionStats| -> JsValue {
+        let name = regions[usize::from(*region)].name.as_str().into();
+        let own = [
+            ("name", name),
+            ("tetrahedra", field.tetrahedra().into()),
+            ("errorBound", (error * range).into()),
+        ];
+        object(&[&own[..], &sums(field)].concat())
+    };
+    let regions = if regions.is_empty() { JsValue::UNDEFINED } else { objects(found.iter().map(of_region)) };
+    let mesh = session.last_view();
     let mut histogram = Histogram::new(low, high, bins as usize);
-    histogram.add_mesh(mesh);
-    let [min, max] = stats.range();
+    histogram.add_mesh(&mesh);
     let [below, above] = histogram.outside();
     let edges: Vec<f64> = (0..=bins as usize).map(|b| histogram.edge(b)).collect();
     let percentiles: Vec<f64> = fractions.iter().map(|part| histogram.percentile(*part)).collect();
-    Ok(object(&[
+    let own = [
+        ("below", below.into()),
+        ("above", above.into()),
+        ("histogram", doubles(&histogram.volumes())),
+        ("edges", doubles(&edges)),
+        ("percentiles", doubles(&percentiles)),
+        ("regions", regions),
+    ];
+    Ok(object(&[&sums(&FieldStats::of(&mesh))[..], &own].concat()))
+}
+
+fn sums(stats: &FieldStats) -> [(&'static str, JsValue); 6] {
+    let [min, max] = stats.range();
+    [
         ("volume", stats.volume().into()),
         ("integral", stats.integral().into()),
         ("mean", stats.mean().into()),
         ("deviation", stats.deviation().into()),
         ("min", min.into()),
         ("max", max.into()),
-        ("below", below.into()),
-        ("above", above.into()),
-        ("histogram", doubles(&histogram.volumes())),
-        ("edges", doubles(&edges)),
-        ("percentiles", doubles(&percentiles)),
-    ]))
+    ]
 }
 
 fn triangles(positions: &[[f64; 3]], values: &[f64], indices: &[[u32; 3]], stored: &Stored) -> Object {

@@ -1,5 +1,5 @@
 // What a page does with the viewer: each option and event type-checks, and without a page there is a clear error.
-import type { LineProfile, Mesh, MtInfo } from "tetralod";
+import type { FieldSums, LineProfile, Mesh, MtInfo, RegionStats } from "tetralod";
 import {
   TetralodError,
   Viewer,
@@ -68,6 +68,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   });
   await viewer.set({ slices: [{ ...half, opacity: 0.5, edges: true, field: "p", clipped: false }], clips: [half] });
   await viewer.set({ boundary: { opacity: 0.2, edges: true, colour: "#ffffff" }, clipBox: [0, 0, 0, 1, 1, 1] });
+  await viewer.set({ boundary: { colourBy: "region", regionOpacities: { casing: 0.2, 4: 0.5 } } });
   await viewer.set({ cells: { shape: "wire", shrink: 0.2, cut: half, colourBy: "error", width: 2 } });
   await viewer.set({ streamlines: { fields: ["u", "v", "w"], seeds: [[0, 0, 0]], radius: 0.1, field: "p" } });
   const deform: DeformState = { field: "u", factor: 20, phase: 0.25, undeformed: true };
@@ -104,7 +105,10 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const label: string | undefined = viewer.overlay?.axes[0]?.ticks[0]?.label ?? viewer.overlay?.scaleBar.label;
   const again: Reading | undefined = await viewer.reading(found?.position ?? [0, 0, 0]);
   const along: LineProfile = await viewer.line([0, 0, 0], new Float32Array(3));
-  const { percentiles } = await viewer.stats({ bins: 10, range: [0, 1], fractions: [0.02, 0.98] });
+  const { percentiles, regions } = await viewer.stats({ bins: 10, range: [0, 1], fractions: [0.02, 0.98] });
+  const part: RegionStats | undefined = regions?.[0];
+  const sums: FieldSums | undefined = part;
+  [part?.name, part?.errorBound, sums?.mean] satisfies (string | number | undefined)[];
   const shots: Blob[] = [await viewer.screenshot(), await viewer.screenshot({ width: 9, height: 9, background: "light" })];
   [label, again?.size, again?.region, again?.all[0], along.at[0], percentiles[0], shots.length] satisfies (string | number | undefined)[];
   const texts: string[] = [

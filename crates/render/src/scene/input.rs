@@ -6,7 +6,7 @@ use super::styles::{quantity, scale};
 use super::{SceneError, SceneState};
 use std::borrow::Cow;
 use tetralod::geom::{Bounds, SingleValues};
-use tetralod::mt::{MeshChanges, MtInfo, Regions};
+use tetralod::mt::{MeshChanges, MtInfo, Regions, numbers_of};
 use tetralod::session::{Session, TetQuantity};
 use tetralod::view::{ColourScale, Difference, MeshView};
 
@@ -45,7 +45,7 @@ impl Current {
         &'a self,
         session: &'a Session,
         info: &'a MtInfo,
-        state: &'a SceneState,
+        (state, opacities): (&'a SceneState, Vec<f64>),
         bounds: Bounds,
     ) -> Input<'a> {
         let mesh = session.last_view();
@@ -59,6 +59,7 @@ impl Current {
             tet_values: &self.tet_values,
             regions: session.mesh().map_or(&[][..], |mesh| mesh.regions()),
             colors: session.regions().map_or_else(Vec::new, Regions::colors),
+            opacities,
             info,
             shown: session.field(),
             isovalue: session.first_isovalue(session.field()),
@@ -80,6 +81,22 @@ pub(super) fn quantity_into(
         values.iter_mut().for_each(|value| *value = f64::from(colors[*value as usize]) + 0.5);
     }
     Ok(())
+}
+
+/// The opacity of the boundary of each region, where some have one of their own; else nothing.
+pub(super) fn region_opacities(state: &SceneState, regions: Option<&Regions>) -> Result<Vec<f64>> {
+    let Some(boundary) = state.boundary.as_ref().filter(|boundary| !boundary.region_opacities.is_empty())
+    else {
+        return Ok(Vec::new());
+    };
+    let names: Vec<String> = boundary.region_opacities.keys().cloned().collect();
+    let error = |(_, problem)| SceneError::state("boundary.regionOpacities", problem);
+    let numbers = numbers_of(regions, &names).map_err(error)?;
+    let mut all = vec![boundary.opacity; regions.map_or(0, |regions| regions.all.len())];
+    for (number, opacity) in numbers.into_iter().zip(boundary.region_opacities.values()) {
+        all[usize::from(number)] = *opacity;
+    }
+    Ok(all)
 }
 
 /// The number of the field with a name, of the time step that is shown if it has that; that of the mesh without one. `what` asks for it.
@@ -107,6 +124,8 @@ pub(super) struct Input<'a> {
     /// The region of each tetrahedron, and the colour of each region; nothing without regions.
     pub regions: &'a [u16],
     pub colors: Vec<u8>,
+    /// The opacity of the boundary of each region; nothing where all have the same.
+    pub opacities: Vec<f64>,
     pub info: &'a MtInfo,
     /// The number of the field.
     pub shown: usize,

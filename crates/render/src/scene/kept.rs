@@ -66,7 +66,7 @@ impl Kept {
         &'a mut self,
         info: &'a MtInfo,
         (shown, isovalue): (usize, Option<f64>),
-        state: &'a SceneState,
+        (state, opacities): (&'a SceneState, Vec<f64>),
         bounds: Bounds,
         edits: &mut Vec<Edit<'a>>,
     ) -> Result<(), SceneError> {
@@ -82,6 +82,7 @@ impl Kept {
             tet_values: place.and_then(|i| kept.quantities.get(i)).map_or(&[], Vec::as_slice),
             regions: &kept.regions,
             colors: kept.colors.clone(),
+            opacities,
             info,
             shown,
             isovalue,

@@ -237,14 +237,16 @@ impl Scene {
         let compare = state.compare.unwrap_or(CompareState { at: 0.0, difference: false });
         let other = kept.as_ref().filter(|_| compare.difference);
         current.compare(&session.last_view(), other.map(|kept| kept.mesh.view(field)));
-        objects.list(&current.input(session, info, state, bounds), is_stale, edits)?;
+        let opacities = input::region_opacities(state, session.regions())?;
+        let looks = || (state, opacities.clone());
+        objects.list(&current.input(session, info, looks(), bounds), is_stale, edits)?;
         if is_stale {
             let kept = kept.as_mut().filter(|_| compare.at > 0.0);
             let split = if kept.is_some() { compare.at } else { 0.0 };
             let mut left = Vec::new();
             let listed = kept.map_or(Ok(()), |kept| {
                 left.extend(first());
-                kept.list(info, (field, session.first_isovalue(field)), state, bounds, &mut left)
+                kept.list(info, (field, session.first_isovalue(field)), looks(), bounds, &mut left)
             });
             edits.push(Edit::Beside { split, edits: left });
             listed?;
@@ -375,6 +377,8 @@ fn check_numbers(state: &SceneState) -> Result<(), SceneError> {
     let opacities = state.isosurfaces.iter().map(|surface| ("isosurfaces", surface.opacity));
     let opacities = opacities.chain(state.slices.iter().map(|slice| ("slices", slice.opacity)));
     let opacities = opacities.chain(state.boundary.as_ref().map(|boundary| ("boundary", boundary.opacity)));
+    let of_regions = state.boundary.iter().flat_map(|boundary| boundary.region_opacities.values());
+    let opacities = opacities.chain(of_regions.map(|opacity| ("boundary.regionOpacities", *opacity)));
     let deform = state.deform.as_ref();
     let deform = [
         ("deform.factor", deform.and_then(|deform| deform.factor)),

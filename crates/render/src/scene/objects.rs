@@ -3,12 +3,14 @@
 use super::error::Result;
 use super::input::Input;
 use super::moves::Moves;
-use super::state::{ArrowState, Colour, ColourBy, IsosurfaceState, StreamlineState};
+use super::state::{ArrowState, BoundaryState, Colour, ColourBy, IsosurfaceState, StreamlineState};
 use super::styles::{cell_style, clips, isosurface_style, medium, other_clips, range, scale};
 use super::{Legend, SliceState};
 use crate::draw::{Colouring, EdgeLook, Edit, Lighting, Style};
+use std::borrow::Cow;
+use std::cmp::Ordering;
 use tetralod::geom::SingleValues;
-use tetralod::mesh::REGION_COLORS;
+use tetralod::mesh::NONE;
 use tetralod::mt::MeshChanges;
 use tetralod::session::TetQuantity;
 use tetralod::view::{
@@ -24,7 +26,7 @@ const BOUNDARY: u32 = 3 << 16;
 const TUBES: u32 = BOUNDARY + 1;
 const ARROWS: u32 = BOUNDARY + 2;
 const UNDEFORMED: u32 = BOUNDARY + 3;
-/// The boundary in the colours of regions: one for each colour.
+/// The boundary where regions look different: one for each look.
 const REGIONS: u32 = 4 << 16;
 
 /// What the model without displacement looks like.
@@ -41,8 +43,8 @@ pub(super) struct Objects {
     /// What closes the boundary where planes cut it open.
     pub(super) caps: Vec<Section>,
     pub(super) boundary: Displaced<BoundarySurface>,
-    /// The boundary by colour, if regions give it its colours.
-    by_color: Vec<Displaced<BoundarySurface>>,
+    /// The boundary by what regions look like, if not all look the same.
+    pub(super) groups: Vec<Group>,
     /// The boundary as it is without displacement.
     undeformed: BoundarySurface,
     pub(super) tubes: Displaced<Solids>,
@@ -59,6 +61,13 @@ pub(super) struct Objects {
 pub(super) struct Displaced<S> {
     pub(super) surface: S,
     pub(super) moves: Vec<[f64; 3]>,
+}
+
+/// The boundary of all regions that look the same.
+#[derive(Debug, Default)]
+pub(super) struct Group {
+    pub(super) opacity: f64,
+    pub(super) boundary: Displaced<BoundarySurface>,
 }
 
 #[derive(Debug, Default)]
@@ -107,7 +116,7 @@ impl Objects {
             slices,
             caps,
             boundary,
-            by_color,
+            groups,
             undeformed,
             tubes,
             arrows,
@@ -132,9 +141,9 @@ impl Objects {
             own.update(input, by, key, state)
         })?;
         list_each(slices, SLICES, &input.state.slices, edits, |own, key, state| {
-            own.update(input, by, key, state)
+            own.update(input, &input.mesh, by, key, state)
         })?;
-        list_boundary((boundary, by_color), caps, input, by, edits)?;
+        list_boundary((boundary, groups), caps, input, by, edits)?;
         list_undeformed(undeformed, input, edits);
         update_legend(legend, input)?;
         edits.push(streamlines(tubes, input, by, legend)?);
@@ -249,20 +258,22 @@ where
 }
 
 impl Section {
+    /// Cuts `mesh`: that of the input, or some of its tetrahedra.
     fn update<'a>(
         &'a mut self,
         input: &Input<'a>,
+        mesh: &MeshView<'_>,
         by: &Option<Moves<'_>>,
         key: u32,
         state: &SliceState,
     ) -> Result<Edit<'a>> {
         let field = input.field("slices", state.field.as_ref())?;
         let plane = state.plane();
-        self.slice.extract(&input.mesh, &plane.plane());
+        self.slice.extract(mesh, &plane.plane());
         let is_other = field != input.shown;
-        let values = is_other.then(|| self.slice.interpolate(&input.mesh, &(input.fields)(field)));
+        let values = is_other.then(|| self.slice.interpolate(mesh, &(input.fields)(field)));
         self.values = values.unwrap_or_default();
-        let moves = by.as_ref().map(|by| by.at(|component| self.slice.interpolate(&input.mesh, component)));
+        let moves = by.as_ref().map(|by| by.at(|component| self.slice.interpolate(mesh, component)));
         self.moves = moves.unwrap_or_default();
         self.inner_sides = self.slice.cell_sides().iter().map(|sides| !sides & 7).collect();
         let style = Style {
@@ -286,8 +297,27 @@ impl Section {
     }
 }
 
+/// What regions look like: their colour, where they give it, and their opacity.
+type RegionLook = (Option<u8>, f64);
+
+/// What each region looks like; nothing where all look the same.
+fn region_looks(input: &Input<'_>, boundary: &BoundaryState) -> Vec<RegionLook> {
+    let is_by_region = boundary.colour.is_none() && boundary.colour_by == ColourBy::Region;
+    let colors = if is_by_region { &input.colors[..] } else { &[] };
+    let opacity = |region: usize| input.opacities.get(region).copied().unwrap_or(boundary.opacity);
+    let count = colors.len().max(input.opacities.len());
+    (0..count).map(|region| (colors.get(region).copied(), opacity(region))).collect()
+}
+
+/// Each of some once, in order.
+fn distinct<T: Copy + PartialEq>(mut all: Vec<T>, order: impl Fn(&T, &T) -> Ordering) -> Vec<T> {
+    all.sort_by(order);
+    all.dedup();
+    all
+}
+
 fn list_boundary<'a>(
-    (own, by_color): (&'a mut Displaced<BoundarySurface>, &'a mut Vec<Displaced<BoundarySurface>>),
+    (own, groups): (&'a mut Displaced<BoundarySurface>, &'a mut Vec<Group>),
     caps: &'a mut Vec<Section>,
     input: &Input<'a>,
     by: &Option<Moves<'_>>,
@@ -295,15 +325,10 @@ fn list_boundary<'a>(
 ) -> Result<()> {
     let Some(boundary) = &input.state.boundary else {
         edits.push(Edit::Remove(BOUNDARY));
-        resize(by_color, 0, REGIONS, edits);
+        resize(groups, 0, REGIONS, edits);
         resize(caps, 0, CAPS, edits);
         return Ok(());
     };
-    own.surface.extract(&input.mesh);
-    own.follow(by, BoundarySurface::interpolate);
-    let own = &*own;
-    let is_by_region = boundary.colour.is_none() && boundary.colour_by == ColourBy::Region;
-    let colors = if is_by_region { &input.colors[..] } else { &[] };
     let scale = Colouring::Scale(input.scale(input.shown)?);
     let style = Style {
         colouring: boundary.colour.map_or(scale, |colour| Colouring::Sides([colour.rgb(); 2])),
@@ -312,38 +337,72 @@ fn list_boundary<'a>(
         edges: boundary.edges.then(EdgeLook::default),
         clips: if boundary.clipped { u32::MAX } else { 0 },
     };
-    resize(by_color, if colors.is_empty() { 0 } else { REGION_COLORS.into() }, REGIONS, edits);
-    if colors.is_empty() {
-        let triangles = Triangles { single: input.single(input.shown), ..own.triangles() };
+    let of_region = region_looks(input, boundary);
+    let by_look = |a: &RegionLook, b: &RegionLook| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
+    let looks = distinct(of_region.clone(), by_look);
+    resize(groups, looks.len(), REGIONS, edits);
+    let single = input.single(input.shown);
+    if looks.is_empty() {
+        own.surface.extract(&input.mesh);
+        own.follow(by, BoundarySurface::interpolate);
+        let triangles = Triangles { single, ..own.triangles() };
         edits.push(Edit::Surface { key: BOUNDARY, triangles, changes: None, style });
     } else {
         edits.push(Edit::Remove(BOUNDARY));
-        for (color, part) in (0..).zip(by_color.iter_mut()) {
-            if !colors.contains(&color) {
-                edits.push(Edit::Remove(REGIONS + u32::from(color)));
-                continue;
-            }
-            let has_color = |tet: u32| colors[usize::from(input.regions[tet as usize])] == color;
-            part.surface.extract_of(&input.mesh, has_color);
-            part.follow(by, BoundarySurface::interpolate);
-            let colour = Colour(region_color(color)).rgb();
-            let style = Style { colouring: Colouring::Sides([colour; 2]), ..style };
-            let (key, triangles) = (REGIONS + u32::from(color), part.triangles());
-            edits.push(Edit::Surface { key, triangles, changes: None, style });
-        }
     }
-    let cap = |ClipPlane { normal, offset }| SliceState {
+    let look = |tet: u32| of_region[usize::from(input.regions[tet as usize])];
+    for (key, (group, own)) in (REGIONS..).zip(groups.iter_mut().zip(&looks)) {
+        let (color, opacity) = *own;
+        group.opacity = opacity;
+        // An interface is drawn once: as that of the region that hides more.
+        let is_seen = |beside: u32| beside == NONE || look(beside).1 < opacity;
+        let part = &mut group.boundary;
+        part.surface.extract_of(&input.mesh, |tet, beside| look(tet) == *own && is_seen(beside));
+        part.follow(by, BoundarySurface::interpolate);
+        let colouring =
+            color.map_or(style.colouring, |color| Colouring::Sides([Colour(region_color(color)).rgb(); 2]));
+        let style = Style { colouring, opacity: opacity as f32, ..style };
+        let triangles = Triangles { single, ..part.triangles() };
+        edits.push(Edit::Surface { key, triangles, changes: None, style });
+    }
+    list_caps(caps, boundary, input, by, edits)
+}
+
+/// What clip planes cut open is closed: for each opacity of regions by sections of these.
+fn list_caps<'a>(
+    caps: &'a mut Vec<Section>,
+    boundary: &BoundaryState,
+    input: &Input<'a>,
+    by: &Option<Moves<'_>>,
+    edits: &mut Edits<'a>,
+) -> Result<()> {
+    let planes = if boundary.clipped { clips(input.state) } else { Vec::new() };
+    let opacities = distinct(input.opacities.clone(), f64::total_cmp);
+    let part = |opacity: f64| {
+        let has = |t: usize| input.opacities[usize::from(input.regions[t])] == opacity;
+        let tets = input.mesh.tets.iter().enumerate();
+        (opacity, tets.map(|(t, tet)| if has(t) { *tet } else { [NONE; 4] }).collect())
+    };
+    let parts: Vec<(f64, Cow<'_, [[u32; 4]]>)> = match opacities[..] {
+        _ if planes.is_empty() => Vec::new(),
+        [] => vec![(boundary.opacity, Cow::Borrowed(input.mesh.tets))],
+        _ => opacities.iter().map(|opacity| part(*opacity)).collect(),
+    };
+    let cap = |opacity: f64, ClipPlane { normal, offset }: ClipPlane| SliceState {
         normal,
         offset,
-        opacity: boundary.opacity,
+        opacity,
         edges: boundary.edges,
         field: None,
         clipped: true,
     };
-    // What the planes cut open is closed.
-    let cutting = if boundary.clipped { clips(input.state) } else { Vec::new() };
-    let cutting: Vec<SliceState> = cutting.into_iter().map(cap).collect();
-    list_each(caps, CAPS, &cutting, edits, |own, key, state| own.update(input, by, key, state))
+    let cutting: Vec<(SliceState, &[[u32; 4]])> = parts
+        .iter()
+        .flat_map(|(opacity, tets)| planes.iter().map(|plane| (cap(*opacity, *plane), &tets[..])))
+        .collect();
+    list_each(caps, CAPS, &cutting, edits, |own, key, (state, tets)| {
+        own.update(input, &MeshView { tets, ..input.mesh }, by, key, state)
+    })
 }
 
 fn list_undeformed<'a>(own: &'a mut BoundarySurface, input: &Input<'a>, edits: &mut Edits<'a>) {

@@ -28,7 +28,12 @@ impl Objects {
         let tubes = state.streamlines.as_ref().map(|_| (self.tubes.triangles(), clips));
         let arrows = state.arrows.as_ref().map(|_| (self.arrows.triangles(), clips));
         let boundary = state.boundary.as_ref();
-        let boundary = boundary.map(|shown| (self.boundary.triangles(), cut_by(shown.clipped)));
+        let groups = self.groups.iter().filter(|group| group.opacity > 0.0).map(|group| &group.boundary);
+        let whole = self.groups.is_empty().then_some(&self.boundary);
+        let boundary = boundary.into_iter().flat_map(|shown| {
+            let parts = groups.clone().chain(whole);
+            parts.map(move |part| (part.triangles(), cut_by(shown.clipped)))
+        });
         let surfaces = isosurfaces.chain(tubes).chain(arrows).chain(boundary);
         let hits = surfaces.filter_map(|(triangles, clips)| hit(&triangles, look.moved, ray, clips));
         let mut found: Vec<(f64, [f64; 3])> = hits.collect();
@@ -70,8 +75,9 @@ impl Objects {
     /// The nearest point of the sections where they are displaced to.
     fn first_section(&self, state: &SceneState, look: &Look, ray: &Ray) -> Option<(f64, [f64; 3])> {
         let is_closed = state.boundary.as_ref().is_some_and(|boundary| boundary.clipped);
-        let caps =
-            self.caps.iter().zip(&look.clips).filter(|_| is_closed).map(|(cap, clip)| (cap, *clip, true));
+        // For each opacity of regions there is a section with each plane.
+        let caps = self.caps.iter().zip(look.clips.iter().cycle()).filter(|_| is_closed);
+        let caps = caps.map(|(cap, clip)| (cap, *clip, true));
         let slices = self.slices.iter().zip(&state.slices);
         let slices = slices.map(|(own, slice)| (own, slice.plane().clip(), slice.clipped));
         let hits = slices.chain(caps).filter_map(|(own, section, is_clipped)| {

@@ -1,6 +1,7 @@
 //! What a scene shows, as plain data: it can be saved, sent and compared.
 
 use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 use tetralod::geom::Bounds;
 use tetralod::view::{ClipPlane, Colormap, Plane, VIRIDIS};
@@ -216,6 +217,9 @@ fn yes() -> bool {
 pub struct BoundaryState {
     /// 0 to 1.
     pub opacity: f64,
+    /// Regions with another opacity, by their names or labels. Where a region is more opaque than one beside it, its interface with that is
+    /// drawn, too: it is seen through the other.
+    pub region_opacities: BTreeMap<String, f64>,
     /// Whether the edges of tetrahedra are drawn.
     pub edges: bool,
     /// One colour instead of those of the values.
@@ -228,7 +232,14 @@ pub struct BoundaryState {
 
 impl Default for BoundaryState {
     fn default() -> Self {
-        Self { opacity: 1.0, edges: false, colour: None, colour_by: ColourBy::Field, clipped: true }
+        Self {
+            opacity: 1.0,
+            region_opacities: BTreeMap::new(),
+            edges: false,
+            colour: None,
+            colour_by: ColourBy::Field,
+            clipped: true,
+        }
     }
 }
 
