@@ -190,7 +190,7 @@ export interface SceneState {
    */
   regions?: (string | number)[];
   /**
-   * Which tetrahedra are shown by the values of a field; all without it. It is a picture only: pass `ranges` to `refine` to fetch nothing else.
+   * What is shown by the values of a field; all without it. It is a picture only: pass `ranges` to `refine` to fetch nothing else.
    */
   threshold?: ThresholdState;
   /** A box with handles. It is a picture only: pass `box` to `refine` to use it. */
@@ -198,14 +198,19 @@ export interface SceneState {
 }
 
 /**
- * Which tetrahedra are shown, as a whole: those whose four vertices have a value within a range, ends included. What is drawn of the others is
- * nothing, so the boundary is that of what is shown.
+ * What is shown: where a field has a value within a range, ends included. What is drawn of all else is nothing, so the boundary is that of what
+ * is shown; the viewer's `mesh()`, `surface()`, `stats()` and its other tools are of it, too.
  */
 export interface ThresholdState {
   /** In field units, ascending. */
   range: [low: number, high: number];
   /** The field; the one that is shown without it. */
   field?: string;
+  /**
+   * Whether tetrahedra are cut where the field crosses an end of the range, so that the boundary is smooth there. Without it they are shown as a
+   * whole: those whose four vertices have a value within it.
+   */
+  cut?: boolean;
 }
 
 /** All that can be set: what is drawn, and where from. Plain data, for JSON and URLs. */

@@ -73,7 +73,8 @@ function noCell() {
   if (!range || mode() === "volume") return undefined;
   const { name, min, max } = shownField();
   const [low, high] = range.map((x) => rounded(x, max - min));
-  return { words: `No cell has all values of ${name} from ${low} to ${high}.`, label: "Show all cells", act: () => store.change({ threshold: undefined }) };
+  const none = store.state["threshold-cut"] ? `No value of ${name} is` : `No cell has all values of ${name}`;
+  return { words: `${none} from ${low} to ${high}.`, label: "Show all cells", act: () => store.change({ threshold: undefined }) };
 }
 
 /** Whether a box with a volume has a part in common with the model. @param {import("./volume.js").Box} box */

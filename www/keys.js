@@ -11,6 +11,7 @@ import { toggle } from "./parts.js";
 import { fullScreen } from "./picture.js";
 import { showTab } from "./tabs.js";
 import { switchTheme } from "./theme.js";
+import { toggleCut } from "./threshold.js";
 
 /**
  * A key, or several of the same meaning: letters are those of the key without Shift, `Ctrl` is also the command key. Without `act`,
@@ -48,6 +49,7 @@ const TABLE = {
     { keys: ["V"], what: "to the picture", act: () => $("canvas").focus() },
     { keys: ["D"], what: "deformed shape, or as it is", act: toggleDeformation },
     { keys: ["M"], what: "mark the extremes, or not", act: toggleExtremes },
+    { keys: ["C"], what: "cut cells at the ends of the range that is shown, or show whole ones", act: toggleCut },
     { keys: ["I"], what: "to the isovalue", act: () => toControl("isovalue") },
     { keys: ["O"], what: "gallery and files", act: openGallery },
     { keys: ["G"], what: "settings", act: () => showTab("settings") },

@@ -59,7 +59,7 @@ export const LOOKS = /** @type {const} */ ([
     "reversed",
     "bands",
   ],
-  ...["range", "threshold", "log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
+  ...["range", "threshold", "threshold-cut", "log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
 ]);
 
 /** The surface of the domain around other parts. */

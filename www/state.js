@@ -27,7 +27,23 @@ import { AXES, fieldNames, inner, rangeOf, stepsOf, vectors } from "./volume.js"
 
 /** Controls that have a value of their own: they are bound to it by their ids. Those that compare meshes have no entry. */
 const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
-  ["outline", "undeformed", "inside", "arrows", "flow-boundary", "reversed", "log", "extremes", "handle", "focus", "axes", "fly", "freeze", "difference"],
+  [
+    "outline",
+    "threshold-cut",
+    "undeformed",
+    "inside",
+    "arrows",
+    "flow-boundary",
+    "reversed",
+    "log",
+    "extremes",
+    "handle",
+    "focus",
+    "axes",
+    "fly",
+    "freeze",
+    "difference",
+  ],
   ["shrink", "shade", "rake", "pixels", "budget", "frame-time", "split"],
   ["shape", "colour-by", "boundary-colour", "flow-colour", "map", "bands", "region", "background", "surface-colour", "vector", "deform", "over-time", "unit"],
 ]);
@@ -377,6 +393,7 @@ const ENTRIES = {
       return draft.threshold !== undefined;
     },
   },
+  "threshold-cut": control("threshold-cut"),
   transfer: {
     get: ({ transfer }) => curveWords(transfer),
     set(words, draft) {

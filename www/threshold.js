@@ -1,4 +1,4 @@
-/** Which cells are shown by the values of the field: those whose values are all within a range. */
+/** What is shown by the values of the field: cells whose values are all within a range, or what is left of all cells that are cut at its ends. */
 
 import { $, input } from "./dom.js";
 import { shownField } from "./fields.js";
@@ -10,8 +10,15 @@ const ENDS = /** @type {const} */ (["threshold-low", "threshold-high"]);
 
 /** What the scene says of it. @returns {import("tetralod/viewer").ThresholdState | null} */
 export function threshold() {
-  const { threshold: range, field } = store.state;
-  return range ? { field, range } : null;
+  const { threshold: range, field, "threshold-cut": cut } = store.state;
+  return range ? { field, range, ...(cut ? { cut } : {}) } : null;
+}
+
+/** Cuts cells at the ends of the range, or shows whole ones; turns the threshold on if it is off. */
+export function toggleCut() {
+  if (!demo.info) return;
+  if (!store.state.threshold) toggle();
+  store.change({ "threshold-cut": !store.state["threshold-cut"] });
 }
 
 /** Turns it on for the upper half of the values, or off. */

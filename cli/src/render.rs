@@ -120,16 +120,23 @@ fn parse_dimensions(text: &str) -> Result<[u32; 2], String> {
 }
 
 impl Placed {
-    /// The camera of each picture, at one distance from the middle: the largest at which one of them shows all.
+    /// The camera of each picture, at one distance from what it looks at: the largest at which one of them shows all.
     fn cameras(&self, bounds: &Bounds, aspect: f64, frames: &[Frame]) -> Vec<Camera> {
-        let all = frames.iter().map(|frame| self.camera(bounds, aspect, frame.turned));
+        // What turns has its middle in the middle of all pictures.
+        let fit =
+            if frames.iter().any(|frame| frame.turned != 0.0) { Camera::fit_around } else { Camera::fit };
+        let all = frames.iter().map(|frame| {
+            let mut camera = self.camera(bounds, aspect, frame.turned);
+            fit(&mut camera, bounds, aspect);
+            camera
+        });
         let mut cameras: Vec<Camera> = all.collect();
         let farthest = cameras.iter().map(Camera::distance).fold(0.0, f64::max);
         cameras.iter_mut().for_each(|camera| camera.zoom(farthest / camera.distance() / self.zoom));
         cameras
     }
 
-    /// The camera that shows all, `turned` by so many degrees around it.
+    /// The camera that looks in the right direction, `turned` by so many degrees around the model.
     fn camera(&self, bounds: &Bounds, aspect: f64, turned: f64) -> Camera {
         let mut camera = Camera::home(bounds, aspect);
         if self.orthographic {
@@ -138,7 +145,6 @@ impl Placed {
         camera.turn_to(self.from);
         let [yaw, pitch] = self.turn.map(f64::to_radians);
         camera.orbit(yaw + turned.to_radians(), pitch);
-        camera.fit(bounds, aspect);
         camera
     }
 }

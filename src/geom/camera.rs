@@ -19,6 +19,9 @@ const PAN_LIMIT: f64 = 2.0;
 const FLY_LIMIT: f64 = 4.0;
 const LIMIT: f64 = 100.0;
 
+/// What fits the picture takes this part of it, so that a small margin is left.
+const FILLED: f64 = 0.94;
+
 /// The angles of the home view: from the front, a little to the right and from above.
 const HOME: [f64; 2] = [-1.05, 0.42];
 
@@ -133,7 +136,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A perspective camera that sees all of `bounds` from the front, a little to the right and from above.
+    /// A perspective camera that sees all of `bounds` from the front, a little to the right and from above, as
+    /// [`Camera::fit`] places it.
     ///
     /// Empty or unbounded boxes are taken for the unit cube.
     pub fn home(bounds: &Bounds, aspect: f64) -> Self {
@@ -145,7 +149,7 @@ impl Camera {
         let projection = Projection::Perspective;
         let mut camera =
             Self { target: centre, distance: radius, yaw, pitch, fov: 0.6, projection, centre, radius };
-        camera.distance = camera.fitting_distance(bounds, aspect);
+        camera.fit(bounds, aspect);
         camera
     }
 
@@ -168,28 +172,47 @@ impl Camera {
         }
     }
 
-    /// Moves so that all of `bounds` is in view, its middle in the middle of the picture, without turning; as
-    /// near as the limits of [`Camera::zoom`] allow. Empty or unbounded boxes change nothing.
+    /// Moves so that all of `bounds` is in view, as large as a small margin and the limits of [`Camera::zoom`] allow, without turning. What
+    /// is seen of it is in the middle of the picture; the target is as far ahead as the middle of `bounds`. Empty or unbounded boxes
+    /// change nothing.
     pub fn fit(&mut self, bounds: &Bounds, aspect: f64) {
         if has_size(bounds) {
-            self.set_target(middle(bounds));
-            self.set_distance(self.fitting_distance(bounds, aspect));
+            let spans = self.spans(bounds, aspect);
+            self.place_before(bounds, &spans, Span::distance);
+            let [right, up] = self.scaled_axes(aspect);
+            let [x, y] = spans.map(|span| span.centre(self.distance));
+            self.set_target(middle(bounds) + right * x + up * y);
         }
     }
 
-    /// The smallest distance at which all corners of `bounds` are in view, and a little more.
-    fn fitting_distance(&self, bounds: &Bounds, aspect: f64) -> f64 {
+    /// As [`Camera::fit`], with the middle of `bounds` in the middle of the picture: there it stays when the camera turns around it.
+    pub fn fit_around(&mut self, bounds: &Bounds, aspect: f64) {
+        if has_size(bounds) {
+            self.place_before(bounds, &self.spans(bounds, aspect), Span::distance_around);
+        }
+    }
+
+    /// Looks at the middle of `bounds` from the distance that its spans need, with all of it in front of the eye.
+    fn place_before(&mut self, bounds: &Bounds, spans: &[Span; 2], needed: fn(&Span) -> f64) {
+        let nearest = spans[0].0.iter().fold(0.0_f64, |nearest, [_, ahead]| nearest.min(*ahead));
+        let before = bounds.diagonal() / 2.0 * DISTANCES[0] - nearest;
+        self.set_target(middle(bounds));
+        self.set_distance(spans.iter().map(needed).fold(before, f64::max));
+    }
+
+    /// How the corners of `bounds` span the picture from left to right and from bottom to top.
+    fn spans(&self, bounds: &Bounds, aspect: f64) -> [Span; 2] {
+        let axes = [self.right(), self.up()];
+        let ahead = if self.projection == Projection::Perspective { self.forward() } else { DVec3::ZERO };
+        let half = self.half(aspect);
+        let corners = corners(bounds).map(|corner| corner - middle(bounds));
+        [0, 1].map(|k| Span(corners.map(|p| [p.dot(axes[k]) / half[k], p.dot(ahead)])))
+    }
+
+    /// Right and up on the screen, as long as half of what is seen at distance 1.
+    fn scaled_axes(&self, aspect: f64) -> [DVec3; 2] {
         let [wide, high] = self.half(aspect);
-        let needed = (0..8).map(|corner: usize| {
-            let place = |axis: usize| if corner >> axis & 1 == 0 { bounds.min } else { bounds.max }[axis];
-            let p = DVec3::new(place(0), place(1), place(2)) - self.target;
-            let across = (p.dot(self.right()).abs() / wide).max(p.dot(self.up()).abs() / high);
-            match self.projection {
-                Projection::Perspective => across - p.dot(self.forward()),
-                Projection::Orthographic => across,
-            }
-        });
-        needed.fold(bounds.diagonal() / 2.0, f64::max) * 1.08
+        [self.right() * wide, self.up() * high]
     }
 
     /// Half the width and half the height of what is seen at distance 1.
@@ -438,17 +461,14 @@ impl Camera {
 
     /// All rays of sight.
     pub fn rays(&self, aspect: f64) -> Rays {
-        let scaled = |[wide, high]: [f64; 2]| [self.right() * wide, self.up() * high];
+        let [right, up] = self.scaled_axes(aspect);
         match self.projection {
-            Projection::Perspective => {
-                let [right, up] = scaled(self.half(aspect));
-                Rays {
-                    origin: [self.eye(), DVec3::ZERO, DVec3::ZERO],
-                    direction: [self.forward(), right, up],
-                }
-            }
+            Projection::Perspective => Rays {
+                origin: [self.eye(), DVec3::ZERO, DVec3::ZERO],
+                direction: [self.forward(), right, up],
+            },
             Projection::Orthographic => {
-                let [right, up] = scaled(self.half_size(aspect));
+                let [right, up] = [right, up].map(|axis| axis * self.distance);
                 let middle = self.eye() + self.forward() * self.clip()[0];
                 Rays { origin: [middle, right, up], direction: [self.forward(), DVec3::ZERO, DVec3::ZERO] }
             }
@@ -461,6 +481,40 @@ impl Camera {
     }
 }
 
+/// Points along one direction of the picture: how far each is aside of a target, in halves of what is seen at distance 1, and how far
+/// ahead of it.
+struct Span([[f64; 2]; 8]);
+
+impl Span {
+    /// The smallest distance of the target at which they fit the picture, wherever it is aside.
+    fn distance(&self) -> f64 {
+        (self.most(1.0) + self.most(-1.0)) / 2.0
+    }
+
+    /// The smallest distance at which they do so if it is not aside.
+    fn distance_around(&self) -> f64 {
+        self.most(1.0).max(self.most(-1.0))
+    }
+
+    /// The distance at which none is beyond the margin on one side.
+    fn most(&self, side: f64) -> f64 {
+        self.0
+            .map(|[aside, ahead]| side * aside / FILLED - ahead)
+            .into_iter()
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// How far aside the target is when what they span is in the middle of the picture: between the two that are farthest apart in it.
+    fn centre(&self, distance: f64) -> f64 {
+        let far = self.0.map(|[aside, ahead]| (aside, distance + ahead));
+        let pairs = far.iter().flat_map(|a| far.iter().map(move |b| (*a, *b)));
+        let apart = |((x, far), (y, other)): ((f64, f64), (f64, f64))| {
+            ((x - y) / (far + other), (x * other + y * far) / (far + other))
+        };
+        pairs.map(apart).fold((0.0, 0.0), |most, pair| if pair.0 > most.0 { pair } else { most }).1
+    }
+}
+
 /// Whether a box is neither empty, nor a point, nor unbounded.
 fn has_size(bounds: &Bounds) -> bool {
     bounds.diagonal().is_finite() && bounds.diagonal() > 0.0
@@ -468,6 +522,11 @@ fn has_size(bounds: &Bounds) -> bool {
 
 fn middle(bounds: &Bounds) -> DVec3 {
     (DVec3::from(bounds.min) + DVec3::from(bounds.max)) / 2.0
+}
+
+fn corners(bounds: &Bounds) -> [DVec3; 8] {
+    let place = |i: usize, axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+    std::array::from_fn(|i| DVec3::from([0, 1, 2].map(|axis| place(i, axis))))
 }
 
 /// The aspect of a window that is being closed or not yet laid out may be anything.
@@ -485,23 +544,73 @@ mod tests {
 
     const BOX: Bounds = Bounds { min: [1.0, -2.0, 3.0], max: [4.0, 5.0, 6.0] };
 
-    fn corners(b: &Bounds) -> [DVec3; 8] {
-        std::array::from_fn(|i| {
-            DVec3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] }))
-        })
+    const SIDES: [ViewPreset; 7] = {
+        use ViewPreset::*;
+        [Home, AlongX, AgainstX, AlongY, AgainstY, AlongZ, AgainstZ]
+    };
+
+    /// Where the corners of a box are seen, from the smallest to the largest x and y.
+    fn seen(camera: &Camera, bounds: &Bounds, aspect: f64) -> [DVec2; 2] {
+        let seen = corners(bounds).map(|corner| {
+            let clip = camera.view_projection(aspect) * corner.extend(1.0);
+            assert!(clip.w > 0.0 && (0.0..=1.0).contains(&(clip.z / clip.w)), "{corner} at {clip}");
+            DVec2::new(clip.x, clip.y) / clip.w
+        });
+        [
+            seen.into_iter().fold(DVec2::INFINITY, DVec2::min),
+            seen.into_iter().fold(DVec2::NEG_INFINITY, DVec2::max),
+        ]
     }
 
     #[test]
-    fn home_sees_the_whole_box_on_wide_and_on_narrow_screens() {
-        for aspect in [0.3, 0.46, 1.0, 1.8, 4.0] {
-            let camera = Camera::home(&BOX, aspect);
-            for corner in corners(&BOX) {
-                let clip = camera.view_projection(aspect) * corner.extend(1.0);
-                let p = clip.truncate() / clip.w;
+    fn boxes_of_all_shapes_fill_pictures_of_all_shapes_from_all_sides() {
+        let sizes = [
+            [1.0; 3],
+            [3.0, 7.0, 3.0],
+            [100.0, 100.0, 1.0],
+            [1.0, 1.0, 50.0],
+            [40.0, 1.0, 2.0],
+            [1.0, 1.0, 0.0],
+        ];
+        let boxes = sizes.map(|size| Bounds {
+            min: [5.0, -2.0, 3.0],
+            max: [0, 1, 2].map(|i| [5.0, -2.0, 3.0][i] + size[i]),
+        });
+        for (bounds, aspect) in
+            boxes.iter().flat_map(|b| [0.3, 0.46, 1.0, 1.6, 4.0].map(|aspect| (b, aspect)))
+        {
+            for (side, projection) in
+                SIDES.into_iter().flat_map(|side| BOTH.map(|projection| (side, projection)))
+            {
+                let mut camera = Camera::home(bounds, aspect);
+                camera.set_projection(projection);
+                camera.turn_to(side);
+                let mut around = camera;
+                camera.fit(bounds, aspect);
+                let [low, high] = seen(&camera, bounds, aspect);
+                let what = format!("{bounds:?} {aspect} {side:?} {projection:?}: {low} {high}");
+                let filled = ((high - low) / 2.0).max_element();
+                assert!((filled - FILLED).abs() < 1e-9, "{what}");
+                assert!((low + high).abs().max_element() < 1e-9, "in the middle: {what}");
+                // As near as that, no other place of the eye shows all of it.
+                let nearer = (0..400).all(|i| {
+                    let mut other = camera;
+                    other.zoom(0.999);
+                    let aside = DVec2::new(f64::from(i % 20), f64::from(i / 20)) / 19.0 - 0.5;
+                    other.set_target(camera.target + camera.right() * aside.x + camera.up() * aside.y);
+                    let far = corners(bounds)
+                        .map(|p| other.project(p, aspect).map_or(9.0, |p| p.abs().max_element()));
+                    far.into_iter().fold(0.0, f64::max) > FILLED
+                });
+                assert!(nearer, "{what}");
+                around.fit_around(bounds, aspect);
+                let [low, high] = seen(&around, bounds, aspect);
+                let most = high.max(-low).max_element();
                 assert!(
-                    p.x.abs() <= 1.0 && p.y.abs() <= 1.0 && (0.0..=1.0).contains(&p.z),
-                    "{corner} at {p}"
+                    (most - FILLED).abs() < 1e-9 && around.distance >= camera.distance - 1e-9,
+                    "{what}: {most}"
                 );
+                assert!(around.project(middle(bounds), aspect).unwrap().length() < 1e-9, "{what}");
             }
         }
     }
@@ -675,9 +784,8 @@ mod tests {
                 let mut after = before;
                 after.fit(&bounds, aspect);
                 assert_eq!(after.forward(), before.forward());
-                let seen = corners(&bounds).map(|p| after.project(p, aspect).unwrap().abs().max_element());
-                assert!(seen.iter().all(|x| *x <= 1.0), "{seen:?}");
-                assert!(seen.iter().any(|x| *x > 0.5), "{seen:?}");
+                let [low, high] = seen(&after, &bounds, aspect);
+                assert!((high.max(-low).max_element() - FILLED).abs() < 1e-9, "{low} {high}");
             }
             let mut after = before;
             after.fit(&Bounds::EMPTY, 1.0);

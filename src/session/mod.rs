@@ -43,6 +43,8 @@ pub use quantity::TetQuantity;
 pub use reading::Reading;
 #[doc(hidden)]
 pub use region_stats::RegionStats;
+#[doc(hidden)]
+pub use shown_tets::Within;
 
 use crate::format::{DecodeOptions, Decoder, ExactStatus, FormatError};
 use crate::geom::Bounds;
@@ -50,11 +52,12 @@ use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTes
 use crate::refine::{
     Criterion, Front, LodCriterion, Need, Outcome, Part, RefineStats, Request, RequestError,
 };
-use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges};
+use crate::view::{IsoSurface, MeshView, MeshWithin, NormalKind, Plane, Slice, SurfaceChanges};
 use behind::Behind;
 use block_state::Blocks;
 use depths::Depths;
 use shown_tets::ShownTets;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use thiserror::Error;
@@ -119,6 +122,8 @@ struct Shown {
     /// Another field is to be shown: all values are to be set.
     stale: bool,
     tets: ShownTets,
+    /// Where tetrahedra are cut: what is left of them, with the values of the field.
+    cut: Option<(MeshWithin, Vec<f64>)>,
 }
 
 impl Session {
@@ -301,11 +306,19 @@ impl Session {
         self.shown.tets.choose_regions(regions);
     }
 
-    /// Chooses a field, by its number, and a range in its units: of the tetrahedra, those are shown whose four vertices have a value within it,
-    /// ends included. All if there is none, or no such field. What a request needs is its own matter, as with
-    /// [`Session::show_regions`].
-    pub fn show_within(&mut self, within: Option<(usize, [f64; 2])>) {
+    /// Chooses a range of a field: what [`Session::view`], isosurfaces and sections show is within it. All is if there is none, or no such field.
+    /// What a request needs is its own matter, as with [`Session::show_regions`].
+    pub fn show_within(&mut self, within: Option<Within>) {
         self.shown.tets.choose_within(within);
+    }
+
+    /// The region of each tetrahedron of [`Session::view`], as the last call that brought it up to date left it; empty without regions.
+    pub fn shown_regions(&self) -> Cow<'_, [u16]> {
+        let all = self.mesh().map_or(&[][..], CurrentMesh::regions);
+        match &self.shown.cut {
+            Some((cut, _)) if !all.is_empty() => cut.of_tets(all).into(),
+            _ => all.into(),
+        }
     }
 
     /// The regions of the volume; none if it is not parted, or the base mesh is not there.
@@ -325,7 +338,7 @@ impl Session {
 
     /// The current mesh in model units; empty until the base mesh is there. Tetrahedra that are not shown
     /// ([`Session::show_regions`], [`Session::show_within`]) have no vertices there, but [`NONE`](crate::mesh::NONE) in their places, and are
-    /// no neighbours.
+    /// no neighbours. Where tetrahedra are cut, the points and the pieces that are new come behind those of the mesh.
     pub fn view(&mut self) -> MeshView<'_> {
         self.catch_up();
         view(self.front.as_ref(), &self.shown)
@@ -400,8 +413,19 @@ impl Session {
         (&self.surface, &self.slice)
     }
 
-    /// One of the fields at the vertices of the current mesh, in field units; empty if there is no such field.
+    /// One of the fields at the points of [`Session::view`], as the last call that brought it up to date left it, in field units; empty if there
+    /// is no such field.
     pub fn values(&self, field: usize) -> Vec<f64> {
+        let values = self.values_of_mesh(field);
+        match (&self.shown.cut, self.shown.tets.cut()) {
+            (Some((cut, _)), Some(by)) if by.field == field => cut.values().to_vec(),
+            (Some((cut, _)), _) if !values.is_empty() => cut.interpolate(&values),
+            _ => values,
+        }
+    }
+
+    /// One of the fields at the vertices of the current mesh.
+    fn values_of_mesh(&self, field: usize) -> Vec<f64> {
         let (Some(mesh), Some(info)) = (self.mesh(), self.info().and_then(|info| info.fields.get(field)))
         else {
             return Vec::new();
@@ -489,6 +513,7 @@ impl Session {
     /// Bytes that the current mesh takes with its adjacency, its form in model units, and the queues of refinement.
     pub fn mesh_bytes(&self) -> u64 {
         let shown = 24 * self.shown.positions.len() + 8 * self.shown.values.len() + self.shown.tets.bytes();
+        let shown = shown + self.shown.cut.as_ref().map_or(0, |(cut, values)| cut.bytes() + 8 * values.len());
         self.front.as_ref().map_or(0, |front| front.mesh().bytes() + front.queue_bytes()) + shown as u64
     }
 
@@ -508,6 +533,7 @@ impl Session {
         shown.positions.resize(slots, [0.0; 3]);
         shown.values.resize(slots, 0.0);
         let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]);
+        let is_same = changes.vertices.is_empty() && changes.tets.is_empty() && !shown.stale;
         self.behind.add(&changes, shown.stale);
         self.taken.add(&changes, shown.stale);
         self.sliced.1.add(&changes, shown.stale);
@@ -518,10 +544,35 @@ impl Session {
         if std::mem::take(&mut shown.stale) {
             shown.values.iter_mut().enumerate().for_each(|(slot, value)| *value = value_at(slot));
         }
+        if !is_same {
+            self.cut();
+        }
+    }
+
+    /// Cuts what is shown, if it is to be cut.
+    fn cut(&mut self) {
+        self.shown.cut = None;
+        let Some(Within { field, range, .. }) = self.shown.tets.cut() else { return };
+        let by = self.values_of_mesh(field);
+        let whole = view(self.front.as_ref(), &self.shown);
+        if by.len() < whole.positions.len() {
+            return;
+        }
+        let cut = MeshWithin::of(&whole, &by, range);
+        let values = if field == self.field { cut.values().to_vec() } else { cut.interpolate(whole.field) };
+        let MeshView { positions, tets, .. } = cut.view(&values);
+        let tets = std::iter::once(0..tets.len() as u32).collect();
+        let all = MeshChanges { tets, ..MeshChanges::of_all_vertices(positions.len()) };
+        let behind = [&mut self.behind, &mut self.taken, &mut self.sliced.1];
+        behind.into_iter().for_each(|behind| behind.add(&all, false));
+        self.shown.cut = Some((cut, values));
     }
 }
 
 fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
+    if let Some((cut, values)) = &shown.cut {
+        return cut.view(values);
+    }
     let all = front.map_or([&[][..]; 2], |front| [front.mesh().tets(), front.mesh().neighbors()]);
     let [tets, neighbors] = shown.tets.tets().unwrap_or(all);
     MeshView { positions: &shown.positions, field: &shown.values, tets, neighbors }

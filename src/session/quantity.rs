@@ -96,6 +96,7 @@ impl Session {
         values: &mut Vec<f64>,
     ) -> Result<(), SessionError> {
         values.clear();
+        self.catch_up();
         let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
@@ -118,6 +119,9 @@ impl Session {
                 let tets = 0..front.mesh().tets().len() as u32;
                 values.extend(tets.map(|t| self.depths.get(mt.creator(front.mesh(), t)) as f64));
             }
+        }
+        if let Some((cut, _)) = &self.shown.cut {
+            *values = cut.of_tets(values);
         }
         Ok(())
     }

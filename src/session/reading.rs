@@ -3,7 +3,7 @@
 use super::quantity::size;
 use super::{Session, SessionError};
 use crate::mt::MultiTessellation;
-use crate::view::Probe;
+use crate::view::{MeshView, Probe};
 
 /// What is known of the current mesh at a point.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +12,8 @@ pub struct Reading {
     pub position: [f64; 3],
     /// The value of each field there, in its own units.
     pub values: Vec<f64>,
-    /// The tetrahedron that holds the point: an index into `tets` of [`Session::view`].
+    /// The tetrahedron that holds the point: an index into `tets` of [`Session::view`], if none are cut there; else into those of
+    /// [`Session::mesh`].
     pub tet: u32,
     /// The number of its region, in [`Session::regions`]; none without regions.
     pub region: Option<u16>,
@@ -36,6 +37,10 @@ impl Session {
             return Err(SessionError::NotReady);
         };
         let (mesh, info) = (front.mesh(), mt.info());
+        // A piece is read in the tetrahedron that it is cut out of.
+        let whole = MeshView { tets: mesh.tets(), neighbors: mesh.neighbors(), ..self.last_view() };
+        let cut = self.shown.cut.is_some().then(|| Probe::new(whole).locate(point));
+        let Some(place) = cut.unwrap_or(Some(place)) else { return Ok(None) };
         let Some(tet) = mesh.tet(place.tet) else { return Ok(None) };
         let value = |field: usize| {
             let at = |i: usize| place.weights[i] * info.fields[field].value(mesh.levels(tet[i])[field]);

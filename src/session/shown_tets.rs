@@ -5,13 +5,25 @@ use crate::mesh::{BitSet, NONE};
 use crate::mt::{CurrentMesh, FieldInfo};
 use std::ops::Range;
 
+/// A range of the values of a field, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Within {
+    /// The number of the field.
+    pub field: usize,
+    /// The least and the largest value, in units of the field.
+    pub range: [f64; 2],
+    /// Whether tetrahedra are cut where the field crosses an end of the range. Else those are shown as a whole whose four values are within
+    /// it, and no others.
+    pub is_cut: bool,
+}
+
 /// A copy of the mesh in which tetrahedra that are not shown are free slots, and no neighbours; kept up at the cost of what changed.
 #[derive(Debug, Default)]
 pub(super) struct ShownTets {
     /// The regions that are shown; all if there is no set.
     regions: Option<BitSet>,
-    /// The field all of whose values at a tetrahedron are to be within a range, both ends included.
-    within: Option<(usize, [f64; 2])>,
+    /// What their values are to be within.
+    within: Option<Within>,
     /// Others have been chosen since the copy was made.
     stale: bool,
     tets: Vec<[u32; 4]>,
@@ -27,10 +39,15 @@ impl ShownTets {
         self.regions = set;
     }
 
-    /// Chooses a field, by its number, and the range of its values.
-    pub fn choose_within(&mut self, within: Option<(usize, [f64; 2])>) {
+    /// Chooses what values are to be within.
+    pub fn choose_within(&mut self, within: Option<Within>) {
         self.stale |= within != self.within;
         self.within = within;
+    }
+
+    /// What the tetrahedra are to be cut by, if they are: those that have a value within it are here as a whole.
+    pub fn cut(&self) -> Option<Within> {
+        self.within.filter(|within| within.is_cut)
     }
 
     /// Brings the copy up to date, given the tetrahedra that have changed in the mesh since the last call. Those that have changed in the copy
@@ -41,17 +58,23 @@ impl ShownTets {
             *changed = std::iter::once(0..u32::MAX).collect();
         }
         let regions = self.regions.as_ref().filter(|_| !mesh.regions().is_empty());
-        let within = self.within.and_then(|(field, range)| Some((field, fields.get(field)?, range)));
+        let within = self.within.and_then(|within| Some((fields.get(within.field)?, within)));
         // Nothing is copied where everything is shown.
         if regions.is_none() && within.is_none() {
             (self.tets, self.neighbors) = (Vec::new(), Vec::new());
             return;
         }
         let is_within = |t: u32| {
-            within.is_none_or(|(field, info, [low, high])| {
+            within.is_none_or(|(info, Within { field, range: [low, high], is_cut })| {
                 let corners = mesh.tets()[t as usize];
-                let value = |corner: u32| info.value(mesh.levels(corner)[field]);
-                corners.iter().all(|&corner| corner != NONE && (low..=high).contains(&value(corner)))
+                let values = || corners.iter().map(|&corner| info.value(mesh.levels(corner)[field]));
+                let all = |is: &dyn Fn(f64) -> bool| values().all(is);
+                corners[0] != NONE
+                    && if is_cut {
+                        !all(&|value| value < low) && !all(&|value| value > high)
+                    } else {
+                        all(&|value| (low..=high).contains(&value))
+                    }
             })
         };
         let is_shown =

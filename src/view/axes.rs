@@ -379,6 +379,7 @@ mod tests {
     fn from_the_front_ticks_are_at_the_bottom_and_on_the_left() {
         let mut camera = Camera::home(&BOX, ASPECT);
         camera.turn_to(ViewPreset::AlongY);
+        camera.fit(&BOX, ASPECT);
         let [x, _, z] = tick_edges(&BOX, &camera, ASPECT, [None; 3]);
         let axis = |edge: Option<BoxEdge>| box_axis(edge.unwrap(), &BOX, &camera, ASPECT, 0.15).unwrap();
         assert!(axis(x).outward.y < -0.99 && axis(z).outward.x < -0.99);

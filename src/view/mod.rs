@@ -26,6 +26,7 @@ mod ticks;
 mod triangles;
 mod tubes;
 mod volume;
+mod within;
 
 #[doc(hidden)]
 pub use crate::mesh::Histogram;
@@ -74,6 +75,8 @@ pub use tubes::TubeEnd;
 pub use tubes::TubeOptions;
 #[doc(hidden)]
 pub use volume::{Light, Medium};
+#[doc(hidden)]
+pub use within::MeshWithin;
 
 use crate::geom::Bounds;
 use std::ops::Range;

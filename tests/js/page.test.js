@@ -927,7 +927,8 @@ test("cells of a range, bands and extremes are shown, and a link shows the same"
   const within = await page.evaluate(async () => {
     const { tets, field, offset, scale } = await window.tetralodDemo.viewer.mesh();
     const shown = tets.filter((v) => v !== 0xffffffff);
-    return { count: shown.length, least: shown.reduce((least, v) => Math.min(least, offset + scale * field[v]), Infinity) };
+    const { volume } = await window.tetralodDemo.viewer.stats();
+    return { count: shown.length, volume, least: shown.reduce((least, v) => Math.min(least, offset + scale * field[v]), Infinity) };
   });
   assert.ok(within.count > 0 && within.least >= 0.3 - 1e-6, JSON.stringify(within));
 
@@ -955,6 +956,26 @@ test("cells of a range, bands and extremes are shown, and a link shows the same"
   assert.equal(differing(banded, await still(page, "threshold-reloaded")), 0, "a link shows the same");
   assert.equal(page.url(), address);
   assert.equal(await page.locator("#overlay .extremes path").count(), 2);
+
+  // Cells are cut: what is left has all values of the range, and no others.
+  await page.locator("#canvas").focus();
+  await press(page, "c");
+  await addressed(page, /threshold-cut=1/);
+  await settle(page);
+  assert.ok(await page.isChecked("#threshold-cut"));
+  assert.deepEqual((await state()).threshold, { field: "density", range: [0.3, max], cut: true });
+  const cut = await page.evaluate(async () => {
+    const { viewer } = window.tetralodDemo;
+    const { tets, field, offset, scale } = await viewer.mesh();
+    const least = tets.reduce((least, v) => Math.min(least, offset + scale * field[v]), Infinity);
+    return { count: tets.length, least, volume: (await viewer.stats()).volume };
+  });
+  assert.ok(cut.count > within.count && Math.abs(cut.least - 0.3) < 1e-6, JSON.stringify(cut));
+  assert.ok(cut.volume > within.volume, "cells at the ends count in part");
+  assert.ok(differing(banded, await still(page, "threshold-cut")) > 0.005);
+  await screenshot(page, "page-threshold-cut");
+  await page.uncheck("#threshold-cut");
+  await addressed(page, /#(?!.*threshold-cut)/);
 
   // No cell has such values.
   await page.fill("#threshold-high", "0.1");

@@ -6,7 +6,8 @@ use std::ops::Range;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::NONE;
 use tetralod::mt::{Mt, MtKind};
-use tetralod::session::Session;
+use tetralod::session::{Session, TetQuantity, Within};
+use tetralod::view::{MeshView, MeshWithin, Probe};
 use tetralod_build::{BuildConfig, build};
 
 /// A copy of the mesh, kept up by change lists.
@@ -49,11 +50,16 @@ impl Copy {
 }
 
 /// What is shown are the tetrahedra within a range, and they are neighbours of each other alone.
-fn assert_shown(session: &mut Session, within: Option<(usize, [f64; 2])>) {
-    let values = within.map(|(field, _)| session.values(field)).unwrap_or_default();
+fn assert_shown(session: &mut Session, within: Option<Within>) {
+    if let Some(within) = within.filter(|within| within.is_cut) {
+        return assert_cut(session, within);
+    }
+    let values = within.map(|within| session.values(within.field)).unwrap_or_default();
     let mesh = session.mesh().expect("it is open");
     let is_within = |tet: &[u32; 4]| {
-        within.is_none_or(|(_, [low, high])| tet.iter().all(|&v| (low..=high).contains(&values[v as usize])))
+        within.is_none_or(|Within { range: [low, high], .. }| {
+            tet.iter().all(|&v| (low..=high).contains(&values[v as usize]))
+        })
     };
     let is_shown: Vec<bool> = mesh.tets().iter().map(|tet| tet[0] != NONE && is_within(tet)).collect();
     let (tets, neighbors) = (mesh.tets().to_vec(), mesh.neighbors().to_vec());
@@ -63,6 +69,45 @@ fn assert_shown(session: &mut Session, within: Option<(usize, [f64; 2])>) {
         assert_eq!(view.tets[t], shown(is_here, tets[t]));
         let across = neighbors[t].map(|n| if n != NONE && is_shown[n as usize] { n } else { NONE });
         assert_eq!(view.neighbors[t], shown(is_here, across), "the neighbours of {t}");
+    }
+}
+
+/// What is shown is the part of the mesh within a range, with all that is known of it.
+fn assert_cut(session: &mut Session, Within { field, range, .. }: Within) {
+    let shown = session.view();
+    let (positions, bounds) = (shown.positions.to_vec(), shown.bounds());
+    let fields = [0, 1].map(|field| session.exact_values(field));
+    let mesh = session.mesh().expect("it is open");
+    let positions = &positions[..mesh.positions().len()];
+    let whole = MeshView { positions, field: &fields[field], tets: mesh.tets(), neighbors: mesh.neighbors() };
+    let expected = MeshWithin::of(&whole, &fields[field], range);
+    let of_fields = fields.each_ref().map(|values| expected.interpolate(values));
+    for (number, values) in of_fields.iter().enumerate() {
+        let found = session.values(number);
+        assert!(found.iter().zip(values).all(|(a, b)| (a - b).abs() < 1e-12) && found.len() == values.len());
+    }
+    for quantity in [TetQuantity::Size, TetQuantity::Depth] {
+        assert_eq!(session.tet_quantity(quantity).expect("it is open").len(), expected.view(&[]).tets.len());
+    }
+    let (own, shown) = (session.values(session.field()), session.view());
+    let expected = expected.view(&own);
+    assert_eq!((shown.positions, shown.field), (expected.positions, expected.field));
+    assert_eq!((shown.tets, shown.neighbors), (expected.tets, expected.neighbors));
+    // Probes find the values of all fields inside, and nothing outside.
+    for i in 0..40_u32 {
+        let at = [7, 11, 13].map(|step| f64::from(i * step % 37) / 37.0);
+        let point = [0, 1, 2].map(|axis| bounds.min[axis] + at[axis] * (bounds.max[axis] - bounds.min[axis]));
+        let Some(place) = Probe::new(session.view()).locate(point) else {
+            assert_eq!(session.reading(point), Ok(None));
+            continue;
+        };
+        let reading = session.reading(point).expect("it is open").expect("it is inside");
+        assert!(reading.values[field] > range[0] - 1e-9 && reading.values[field] < range[1] + 1e-9);
+        for (number, found) in reading.values.iter().enumerate() {
+            let values = session.values(number);
+            let expected = place.value(&MeshView { field: &values, ..session.view() });
+            assert!((found - expected).abs() < 1e-9, "field {number}: {found} instead of {expected}");
+        }
     }
 }
 
@@ -105,7 +150,8 @@ fn copies_follow_a_walk_of_requests_and_steps() {
                 session.set_field(i % 2).expect("there are two");
             }
             if i % 12 == 3 || i % 12 == 9 {
-                within = (i % 12 == 3).then_some((i / 12 % 2, [0.2, 0.6]));
+                let range = Within { field: i / 12 % 2, range: [0.2, 0.6], is_cut: i / 24 % 2 == 0 };
+                within = (i % 12 == 3).then_some(range);
                 session.show_within(within);
             }
             if i % 5 < 3 {

@@ -34,3 +34,4 @@ mod support;
 mod twin;
 mod volume;
 mod walk;
+mod within;

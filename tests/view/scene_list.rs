@@ -147,12 +147,12 @@ fn slice(field: Option<&str>) -> SliceState {
     }
 }
 
-fn states() -> [SceneState; 4] {
+fn states() -> [SceneState; 5] {
     let surface = |opacity: f64| IsosurfaceState { opacity, ..IsosurfaceState::default() };
-    let coloured = IsosurfaceState { field: Some("f1".to_owned()), ..IsosurfaceState::default() };
+    let coloured = || IsosurfaceState { field: Some("f1".to_owned()), ..IsosurfaceState::default() };
     [
         SceneState {
-            isosurfaces: vec![surface(1.0), surface(0.5), coloured],
+            isosurfaces: vec![surface(1.0), surface(0.5), coloured()],
             volume: Some(VolumeState::default()),
             ..SceneState::default()
         },
@@ -165,10 +165,19 @@ fn states() -> [SceneState; 4] {
         },
         SceneState { cells: Some(CellState::default()), outline: false, ..SceneState::default() },
         SceneState {
-            threshold: Some(ThresholdState { field: Some("f1".to_owned()), range: [0.1, 0.6] }),
+            threshold: Some(ThresholdState { field: Some("f1".to_owned()), range: [0.1, 0.6], cut: false }),
             isosurfaces: vec![surface(1.0)],
             boundary: Some(BoundaryState::default()),
             colours: ColourState { bands: Some(5), ..ColourState::default() },
+            ..SceneState::default()
+        },
+        SceneState {
+            threshold: Some(ThresholdState { field: Some("f1".to_owned()), range: [0.1, 0.6], cut: true }),
+            isosurfaces: vec![surface(1.0), coloured()],
+            boundary: Some(BoundaryState::default()),
+            slices: vec![slice(None), slice(Some("f1"))],
+            cells: Some(CellState { colour_by: "size".to_owned(), ..CellState::default() }),
+            volume: Some(VolumeState::default()),
             ..SceneState::default()
         },
     ]

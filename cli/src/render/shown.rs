@@ -64,12 +64,15 @@ pub struct Shown {
     /// Cut away all outside of this box.
     #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = parse_bounds, allow_hyphen_values = true)]
     clip_box: Option<Bounds>,
-    /// Show those tetrahedra alone whose four values are within this range, in units of the field; the boundary is theirs.
+    /// Show alone what is within this range, in units of the field: whole tetrahedra, those whose four values are; the boundary is theirs.
     #[arg(long, value_name = "a,b", value_parser = parse_range, allow_hyphen_values = true)]
     threshold: Option<[f64; 2]>,
     /// The field of --threshold [default: that of --field].
     #[arg(long, value_name = "NAME", requires = "threshold")]
     threshold_field: Option<String>,
+    /// Cut tetrahedra where the field crosses the ends of --threshold, so that the boundary is smooth there.
+    #[arg(long, requires = "threshold")]
+    threshold_cut: bool,
     #[command(flatten)]
     deform: Deform,
     /// With --deform, draw the boundary as it is without displacement, too, so that one sees through it.
@@ -374,7 +377,8 @@ impl Shown {
             state.clip_box = Some([x0, y0, z0, x1, y1, z1]);
         }
         if let Some(range) = self.threshold {
-            state.threshold = Some(ThresholdState { field: self.threshold_field.clone(), range });
+            let (field, cut) = (self.threshold_field.clone(), self.threshold_cut);
+            state.threshold = Some(ThresholdState { field, range, cut });
         }
         if let Some((field, factor, phase)) = self.deform.given() {
             state.deform =

@@ -74,7 +74,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const deform: DeformState = { field: "u", factor: 20, phase: 0.25, undeformed: true };
   await viewer.set({ deform });
   await viewer.set({ deform: null });
-  const threshold: ThresholdState = { range: [0.2, 0.8], field: "pressure" };
+  const threshold: ThresholdState = { range: [0.2, 0.8], field: "pressure", cut: true };
   await viewer.set({ threshold });
   const bent = displaced(whole, ["u_x", "u_y", "u_z"], 20);
   [bent.positions, bent.tets, viewer.overlay?.deformation?.factor] satisfies [Float32Array | Float64Array, Uint32Array, number | undefined];

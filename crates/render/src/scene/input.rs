@@ -57,7 +57,7 @@ impl Current {
             largest_difference: difference.map(|difference| difference.largest),
             fields: Box::new(move |field| session.values(field).into()),
             tet_values: &self.tet_values,
-            regions: session.mesh().map_or(&[][..], |mesh| mesh.regions()),
+            regions: session.shown_regions(),
             colors: session.regions().map_or_else(Vec::new, Regions::colors),
             opacities,
             info,
@@ -122,7 +122,7 @@ pub(super) struct Input<'a> {
     /// A number for each tetrahedron, if they are coloured by one.
     pub tet_values: &'a [f64],
     /// The region of each tetrahedron, and the colour of each region; nothing without regions.
-    pub regions: &'a [u16],
+    pub regions: Cow<'a, [u16]>,
     pub colors: Vec<u8>,
     /// The opacity of the boundary of each region; nothing where all have the same.
     pub opacities: Vec<f64>,

@@ -41,7 +41,7 @@ impl KeptMesh {
             quantity_into(session, quantity, values)?;
         }
         let fields = (0..count).map(|field| session.values(field)).collect();
-        let regions = session.mesh().map_or_else(Vec::new, |mesh| mesh.regions().to_vec());
+        let regions = session.shown_regions().into_owned();
         let colors = session.regions().map_or_else(Vec::new, Regions::colors);
         let MeshView { positions, tets, neighbors, .. } = session.view();
         let (positions, tets, neighbors) = (positions.to_vec(), tets.to_vec(), neighbors.to_vec());
@@ -80,7 +80,7 @@ impl Kept {
             largest_difference: None,
             fields: Box::new(move |field| kept.values(field).into()),
             tet_values: place.and_then(|i| kept.quantities.get(i)).map_or(&[], Vec::as_slice),
-            regions: &kept.regions,
+            regions: (&kept.regions).into(),
             colors: kept.colors.clone(),
             opacities,
             info,

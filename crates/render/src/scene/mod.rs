@@ -34,7 +34,7 @@ use styles::clips;
 use styles::{quantity, scale};
 use tetralod::geom::{Bounds, Camera, Ray};
 use tetralod::mt::numbers_of;
-use tetralod::session::{Deformation, Session};
+use tetralod::session::{Deformation, Session, Within};
 use tetralod::view::{MeshView, Place, Probe};
 
 /// The outline of the domain, on a dark and on a light background.
@@ -187,11 +187,11 @@ impl Scene {
         numbers_of(session.regions(), &names).map(Some).map_err(error)
     }
 
-    /// The field of the threshold, by its number, and its range.
-    fn within(&self, session: &Session) -> Result<Option<(usize, [f64; 2])>, SceneError> {
+    /// What the threshold shows.
+    fn within(&self, session: &Session) -> Result<Option<Within>, SceneError> {
         let (Some(threshold), Some(info)) = (&self.state.threshold, session.info()) else { return Ok(None) };
         let field = input::field_number(info, session.field(), "threshold.field", threshold.field.as_ref())?;
-        Ok(Some((field, threshold.range)))
+        Ok(Some(Within { field, range: threshold.range, is_cut: threshold.cut }))
     }
 
     /// Brings what is shown up to date with the session's mesh, and lists what is to be drawn otherwise than before.

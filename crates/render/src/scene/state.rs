@@ -43,7 +43,7 @@ pub struct SceneState {
     pub outline: bool,
     /// The regions that are shown, by their names or labels; all if there is no list. What is drawn of the others is nothing.
     pub regions: Option<Vec<RegionName>>,
-    /// Of the tetrahedra, those alone that are within a range of a field.
+    /// The part alone that is within a range of a field.
     pub threshold: Option<ThresholdState>,
     /// A box with handles: `[x0, y0, z0, x1, y1, z1]`. A picture only.
     pub region: Option<[f64; 6]>,
@@ -95,8 +95,8 @@ impl fmt::Display for RegionName {
     }
 }
 
-/// Which tetrahedra are shown, as a whole: those whose four vertices have a value within a range. What is drawn of the others is nothing, so
-/// the boundary is that of what is shown.
+/// What is shown of the mesh: where a field has a value within a range. What is drawn of all else is nothing, so the boundary is that of what
+/// is shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThresholdState {
@@ -105,6 +105,10 @@ pub struct ThresholdState {
     pub field: Option<String>,
     /// The least and the largest value, in units of the field; both ends belong to it.
     pub range: [f64; 2],
+    /// Whether tetrahedra are cut where the field crosses an end of the range. Else they are shown as a whole: those whose four vertices have
+    /// a value within it.
+    #[serde(default)]
+    pub cut: bool,
 }
 
 /// The points of a plane: `normal · p = offset`. As a clip plane it cuts away the side that the normal points to.
