@@ -119,6 +119,10 @@ impl<'de> Deserializer<'de> for Reader {
         visitor.visit_map(self.members()?)
     }
 
+    fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
+        visitor.visit_map(self.members()?)
+    }
+
     /// An enum is the name of one of its variants.
     fn deserialize_enum<V: Visitor<'de>>(
         self,
@@ -136,7 +140,7 @@ impl<'de> Deserializer<'de> for Reader {
 
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf unit unit_struct newtype_struct
-        tuple tuple_struct map identifier
+        tuple tuple_struct identifier
     }
 }
 
