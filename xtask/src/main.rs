@@ -22,11 +22,13 @@ mod package;
 mod paper;
 mod planted;
 mod public_api;
+mod python;
 mod random;
 mod release;
 mod serve;
 mod shell;
 mod suite;
+mod venv;
 mod volumes;
 mod workflows;
 
@@ -41,6 +43,7 @@ usage: cargo xtask COMMAND
   build MODULE...                only some of its wasm modules: core, viewer, build
   demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
                                  volume is made in the background, unless with --small
+  wheel [--OPTION...]            build the wheel of the Python package into target/python/released; options are maturin's
   docs                           make the documentation's site in target/docs
   test [STEP...]                 every check, or the named steps; `test --list` names them
   test --quick                   formatting, lints and native tests; not: documentation, the longest tests, real data,
@@ -80,6 +83,7 @@ fn run() -> Result<()> {
     match command.as_str() {
         "build" => package::build(rest),
         "demo" => demo::run(rest),
+        "wheel" => python::wheel(rest),
         "docs" => docs::run(rest),
         "test" => suite::run(rest),
         "bench" => bench::run(rest),
