@@ -59,7 +59,7 @@
 //! | `tetralod-bench` | a benchmark on one thread |
 //! | `tetralod-cli` | the command `tetralod` |
 //!
-//! The JavaScript API is the npm package `tetralod`. This crate has two features:
+//! The JavaScript API is the npm package `tetralod`, the Python API the package `tetralod` on PyPI. This crate has two features:
 //!
 //! | feature | adds |
 //! |---|---|

@@ -7,6 +7,9 @@ use std::borrow::Cow;
 use std::io;
 use std::io::Write;
 
+/// The exit code where something failed.
+pub const FAILED: u8 = 1;
+
 /// How much a command that writes a file says about it.
 #[derive(Default, clap::Args)]
 pub struct Verbosity {

@@ -4,20 +4,23 @@ use clap::Command;
 use clap::error::ErrorKind;
 use std::sync::OnceLock;
 
-/// The definition of the command line, which `main` sets: messages are those of its subcommands, and these use this file.
-static DEFINITION: OnceLock<fn() -> Command> = OnceLock::new();
+/// The definition of the command line, which [`run`](crate::run) sets, and the subcommand that was given: messages are those of its
+/// subcommands, and these use this file.
+static DEFINITION: OnceLock<(fn() -> Command, String)> = OnceLock::new();
 
-/// Says how the command line is defined, once.
-pub fn define(command: fn() -> Command) {
-    DEFINITION.get_or_init(|| command);
+/// Says how the command line is defined, and which subcommand was given, once.
+pub fn define(command: fn() -> Command, subcommand: String) {
+    DEFINITION.get_or_init(|| (command, subcommand));
 }
 
 /// Ends the program as wrong usage, with a word about what to do instead.
 pub fn refuse_usage(what: &str) -> ! {
-    let mut command = DEFINITION.get().map_or_else(|| Command::new("tetralod"), |define| define());
+    let (mut command, name) = match DEFINITION.get() {
+        Some((define, subcommand)) => (define(), subcommand.as_str()),
+        None => (Command::new("tetralod"), ""),
+    };
     command.build();
-    let name = std::env::args().nth(1).unwrap_or_default();
-    match command.find_subcommand_mut(&name) {
+    match command.find_subcommand_mut(name) {
         Some(subcommand) => subcommand.error(ErrorKind::ArgumentConflict, what).exit(),
         None => command.error(ErrorKind::ArgumentConflict, what).exit(),
     }

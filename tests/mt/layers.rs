@@ -16,11 +16,11 @@ const EDGES: [(&str, &[&str]); 11] = [
     ("js_sys", &WEB),
     ("web_sys", &WEB),
     ("serde_wasm_bindgen", &WEB),
-    ("std::fs", &["crates/io/src", "cli/src", "src/stream/http"]),
+    ("std::fs", &["crates/io/src", "cli/src", "python/src", "src/stream/http"]),
     ("ureq", &["src/stream/http"]),
     ("rayon", &["src/threads.rs", "cli/src"]),
     // Clocks.
-    ("Instant", &["cli/src", "src/stream/http"]),
+    ("Instant", &["cli/src", "python/src", "src/stream/http"]),
     ("SystemTime", &["cli/src", "src/stream/http"]),
 ];
 
@@ -58,7 +58,7 @@ fn packages() -> Vec<String> {
     let crates = fs::read_dir(root().join("crates")).unwrap();
     let crates = crates.map(|entry| format!("crates/{}", entry.unwrap().file_name().to_string_lossy()));
     let mut packages: Vec<String> = crates.chain(PROGRAMS.map(str::to_owned)).collect();
-    packages.extend([String::new(), "cli".to_owned()]);
+    packages.extend([String::new(), "cli".to_owned(), "python".to_owned()]);
     packages.sort();
     packages
 }

@@ -1,4 +1,5 @@
-//! The licences of the crates that are compiled into the wasm files of the npm package, as one text file.
+//! The licences of the crates that are compiled into the wasm files of the npm package, or into the native module of the Python package, as
+//! one text file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -14,11 +15,22 @@ use crate::shell;
 pub const FILE: &str = "THIRD-PARTY-LICENSES.txt";
 
 /// What dependencies may be licensed under: whoever redistributes the package has to pass on the notices, and no more.
-const ALLOWED: [&str; 9] =
-    ["MIT", "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "BSL-1.0", "CC0-1.0", "ISC", "Unicode-3.0", "Zlib"];
+const ALLOWED: [&str; 11] = [
+    "MIT",
+    "MIT-0",
+    "Apache-2.0",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "BSL-1.0",
+    "CC0-1.0",
+    "CDLA-Permissive-2.0",
+    "ISC",
+    "Unicode-3.0",
+    "Zlib",
+];
 
 const HEAD: &str = "\
-The WebAssembly files of this package contain the following software under the licences below. Where a crate may be used under
+The compiled files of this package contain the following software under the licences below. Where a crate may be used under
 several licences, it is used under those whose texts are given. They also contain parts of the Rust standard library,
 copyright The Rust Project Contributors, under the MIT licence (https://www.rust-lang.org/policies/licenses).
 ";
@@ -26,11 +38,15 @@ copyright The Rust Project Contributors, under the MIT licence (https://www.rust
 /// A crate: its name with its version, and the licence in its manifest.
 type Crates = BTreeMap<String, String>;
 
-/// Writes the licences of all crates in the modules that are made of these packages into `folder`.
-pub fn write<'a>(folder: &Path, packages: impl IntoIterator<Item = &'a str>) -> Result<()> {
+/// Writes the licences of all crates in the modules that are made of these packages into `folder`; for this machine without a `target`.
+pub fn write<'a>(
+    folder: &Path,
+    target: Option<&str>,
+    packages: impl IntoIterator<Item = &'a str>,
+) -> Result<()> {
     let mut crates = Crates::new();
     for package in packages {
-        crates.extend(compiled(package)?);
+        crates.extend(compiled(package, target)?);
     }
     for (name, licence) in &crates {
         check(name, licence)?;
@@ -40,9 +56,9 @@ pub fn write<'a>(folder: &Path, packages: impl IntoIterator<Item = &'a str>) -> 
 }
 
 /// The crates that a module contains: no build scripts and no procedural macros.
-fn compiled(package: &str) -> Result<Crates> {
-    let args = ["tree", "--package", package, "--target", shell::WASM, "--prefix", "none"];
-    let mut command = shell::cargo(args);
+fn compiled(package: &str, target: Option<&str>) -> Result<Crates> {
+    let mut command = shell::cargo(["tree", "--package", package, "--prefix", "none"]);
+    command.args(target.into_iter().flat_map(|target| ["--target", target]));
     command.args(["--edges", "normal,no-proc-macro", "--format", "{p}|{l}"]);
     let tree = shell::output(&mut command)?;
     let rows = tree.lines().map(|line| line.trim_end_matches(" (*)"));
@@ -128,7 +144,7 @@ fn texts(folder: &Path) -> Result<Vec<String>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{check, compiled, page, sources};
+    use super::{check, compiled, page, shell, sources};
 
     #[test]
     fn licences_that_ask_for_more_are_refused() {
@@ -142,7 +158,7 @@ mod tests {
 
     #[test]
     fn every_crate_of_a_module_is_in_the_file() {
-        let crates = compiled("tetralod-web-core").expect("cargo tree");
+        let crates = compiled("tetralod-web-core", Some(shell::WASM)).expect("cargo tree");
         assert!(crates.keys().any(|name| name.starts_with("wasm-bindgen ")));
         assert!(!crates.keys().any(|name| name.starts_with("syn ")), "no procedural macros");
         let text = page(&crates, &sources().expect("cargo metadata")).expect("all licences can be read");

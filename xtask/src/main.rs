@@ -23,11 +23,13 @@ mod pages;
 mod paper;
 mod planted;
 mod public_api;
+mod python;
 mod random;
 mod release;
 mod serve;
 mod shell;
 mod suite;
+mod venv;
 mod volumes;
 mod workflows;
 
@@ -42,6 +44,7 @@ usage: cargo xtask COMMAND
   build MODULE...                only some of its wasm modules: core, viewer, build
   demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
                                  volume is made in the background, unless with --small
+  wheel [--OPTION...]            build the wheel of the Python package into target/python/released; options are maturin's
   docs                           make the documentation's site in target/docs
   pages [--small]                make the demo and the documentation's site as one folder of static files, target/pages;
                                  with --small without the large volume
@@ -83,6 +86,7 @@ fn run() -> Result<()> {
     match command.as_str() {
         "build" => package::build(rest),
         "demo" => demo::run(rest),
+        "wheel" => python::wheel(rest),
         "docs" => docs::run(rest),
         "pages" => pages::run(rest),
         "test" => suite::run(rest),

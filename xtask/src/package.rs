@@ -231,7 +231,7 @@ fn assemble(staging: &Path) -> Result<()> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(licence, staging.join(licence)).context(licence)?;
     }
-    licences::write(staging, MODULES.iter().map(|module| module.package))?;
+    licences::write(staging, Some(shell::WASM), MODULES.iter().map(|module| module.package))?;
     version()?;
     shell::run(shell::command("node", ["xtask/js/inline.mjs"]).arg(staging))?;
     let files = files_of(staging)?;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::{browser, demo, docs, fixture, package, public_api, shell, workflows};
+use crate::{browser, demo, docs, fixture, package, public_api, python, shell, workflows};
 
 struct Step {
     name: &'static str,
@@ -32,7 +32,7 @@ const fn step(
 }
 
 /// Those that take long, or that others wait for, come first.
-const STEPS: [Step; 15] = [
+const STEPS: [Step; 16] = [
     step("fmt", "formatting", &[], fmt),
     step(
         "compile",
@@ -51,6 +51,12 @@ const STEPS: [Step; 15] = [
         "formatting, lints and types of all JavaScript, and the package in Node",
         &["compile", "package"],
         js,
+    ),
+    step(
+        "python",
+        "the Python package: its types, and a wheel in environments of its own",
+        &["compile"],
+        python::test,
     ),
     step("workflows", "building in parts, with a process killed", &["compile"], workflows::test),
     step("doc", "documentation without broken links, and the public names of the crates", &["compile"], doc),

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{browser, shell};
+use crate::{shell, venv};
 
 const SOURCES: &str = "workflows";
 const FOLDER: &str = "target/workflows";
@@ -130,32 +130,9 @@ impl Run {
     }
 }
 
-/// Snakemake, in an environment of its own, which is made where it is missing or another version.
+/// Snakemake, in an environment of its own.
 fn snakemake() -> Result<PathBuf> {
-    let wanted = fs::read_to_string(Path::new(SOURCES).join("requirements.txt"))?;
-    let environment = shell::root().join(FOLDER).join("venv");
-    let (program, done) = (environment.join("bin/snakemake"), environment.join("installed.txt"));
-    if fs::read_to_string(&done).is_ok_and(|installed| installed == wanted) {
-        return Ok(program);
-    }
-    println!("installing Snakemake");
-    require_python()?;
-    shell::run(shell::command("python3", ["-m", "venv", "--clear"]).arg(&environment))?;
-    let install = ["install", "--quiet", "--disable-pip-version-check", "--requirement"];
+    let folder = Path::new(FOLDER).join("venv");
     let requirements = Path::new(SOURCES).join("requirements.txt");
-    shell::run(shell::command(environment.join("bin/pip"), install).arg(requirements))?;
-    fs::write(done, wanted)?;
-    Ok(program)
-}
-
-/// Python as Snakemake needs it.
-fn require_python() -> Result<()> {
-    let check = "import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))";
-    let is_there = || shell::succeeds(&mut shell::command("python3", ["-c", check]));
-    let by_hand = "Python 3.11 or later with its module `venv` is needed: install it (Debian: the package `python3-venv`)";
-    if !is_there() {
-        browser::install_packages("Python", &["python3-venv"], by_hand)?;
-    }
-    ensure!(is_there(), by_hand);
-    Ok(())
+    Ok(venv::program(&venv::environment(&folder, &requirements)?, "snakemake"))
 }

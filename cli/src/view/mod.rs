@@ -16,6 +16,7 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Json, Router};
+use std::ffi::OsString;
 use std::io::Write;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -55,11 +56,11 @@ pub struct Arguments {
 /// Where the page is looked for first: a port that stays the same can be bookmarked, and tunnelled.
 const PORT: u16 = 8080;
 
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, again: &[OsString]) -> Result<()> {
     let Arguments { files, port, host, no_browser, cache, page, build } = arguments;
     let page = Page::of(page.as_deref())?;
     let cache = Cache::of(cache.clone(), build)?;
-    let volumes = Arc::new(Volumes::of(files, cache)?);
+    let volumes = Arc::new(Volumes::of(files, cache, again)?);
     let router = Router::new()
         .route("/data/volumes.json", get(list))
         .route("/files/{number}/{name}", get(file))

@@ -6,6 +6,7 @@ use crate::output::{self, Verbosity};
 use crate::progress::progress_bar;
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -30,6 +31,8 @@ const MT: [u8; 8] = *b"\x89TLOD\r\n\x1a";
 pub struct Volumes {
     all: Mutex<Vec<Volume>>,
     cache: Cache,
+    /// What runs this command in another process: a program, and its first arguments.
+    again: Vec<OsString>,
     /// The build that is under way; none is begun once `stop` was called.
     building: Mutex<Building>,
 }
@@ -136,7 +139,7 @@ struct Failed {
 
 impl Volumes {
     /// Those of these files.
-    pub fn of(given: &[PathBuf], cache: Cache) -> Result<Self> {
+    pub fn of(given: &[PathBuf], cache: Cache, again: &[OsString]) -> Result<Self> {
         for path in given {
             ensure!(
                 files::scheme(path).is_none(),
@@ -153,7 +156,7 @@ impl Volumes {
             state: State::Due,
         };
         let all = Mutex::new(given.iter().map(volume).collect());
-        Ok(Self { all, cache, building: Mutex::default() })
+        Ok(Self { all, cache, again: again.to_vec(), building: Mutex::default() })
     }
 
     fn all(&self) -> MutexGuard<'_, Vec<Volume>> {
@@ -270,8 +273,9 @@ impl Volumes {
         let before = Seen::now(given);
         let workplace = self.cache.workplace()?;
         let [built, report] = ["built.mt", "report.json"].map(|name| workplace.path().join(name));
-        let mut command = Command::new(std::env::current_exe()?);
-        command.arg("build").arg(given).args(&self.cache.options).arg("-o").arg(&built);
+        let (program, first) = self.again.split_first().context("no program")?;
+        let mut command = Command::new(program);
+        command.args(first).arg("build").arg(given).args(&self.cache.options).arg("-o").arg(&built);
         command.args(["--json", "--progress", "json"]).stdin(Stdio::null());
         command.stdout(fs::File::create(&report)?).stderr(Stdio::piped());
         let Some(stderr) = self.begin(&mut command)? else { bail!("stopped") };

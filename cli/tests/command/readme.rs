@@ -14,7 +14,7 @@ const START: &str = "```console";
 pub const PROMPT: &str = "$ tetralod ";
 
 /// The pages with commands. Each is run in a folder of its own.
-const PAGES: [&str; 19] = [
+const PAGES: [&str; 20] = [
     "README.md",
     "docs/README.md",
     "docs/command.md",
@@ -30,6 +30,7 @@ const PAGES: [&str; 19] = [
     "docs/howto/parts.md",
     "docs/howto/inspect.md",
     "docs/howto/notebooks.md",
+    "docs/howto/python.md",
     "docs/howto/several-meshes.md",
     "docs/howto/three.md",
     "docs/howto/views.md",

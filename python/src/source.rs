@@ -1,0 +1,103 @@
+//! Where the bytes of MT files come from: disks, servers, memory of Python.
+
+use crate::errors::Failure;
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use std::fs::File;
+use std::io::Cursor;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use tetralod::stream::{
+    Arrived, CacheFolder, FileSource, HttpOptions, HttpSource, RangeSource, StreamError, Traffic, WantedRange,
+};
+
+/// How long is waited at a time before Python is asked whether to go on.
+const SHORT: Duration = Duration::from_millis(50);
+
+/// The error of Python's that has ended a wait.
+pub type Interrupt = Arc<Mutex<Option<PyErr>>>;
+
+/// What an MT file may be given as.
+#[derive(FromPyObject)]
+pub enum Given {
+    Bytes(PyBackedBytes),
+    Path(PathBuf),
+}
+
+/// How a server is asked.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Network {
+    headers: Vec<(String, String)>,
+    cache: Option<PathBuf>,
+    cache_bytes: u64,
+}
+
+/// Bytes of an MT file; waits for them end at Ctrl-C.
+pub struct Source {
+    inner: Box<dyn RangeSource + Send>,
+    interrupt: Interrupt,
+}
+
+impl Source {
+    /// Of a path, an address that begins with `http://` or `https://`, or bytes.
+    pub fn of(given: Given, network: Network, interrupt: &Interrupt) -> Result<Self, Failure> {
+        let unreadable = |error: std::io::Error| Failure::new("bad-source", error.to_string());
+        let inner: Box<dyn RangeSource + Send> = match given {
+            Given::Bytes(bytes) => Box::new(FileSource::new(Cursor::new(bytes))?),
+            Given::Path(path) => match url(&path) {
+                Some(url) => Box::new(HttpSource::new(url, network.options())),
+                None => Box::new(FileSource::new(File::open(&path).map_err(unreadable)?)?),
+            },
+        };
+        Ok(Self { inner, interrupt: Arc::clone(interrupt) })
+    }
+}
+
+impl Network {
+    fn options(self) -> HttpOptions {
+        let Self { headers, cache, cache_bytes } = self;
+        let cache = cache.map(|path| CacheFolder { path, max_bytes: cache_bytes });
+        HttpOptions { headers, cache, ..HttpOptions::default() }
+    }
+}
+
+/// The address, if a path is one.
+fn url(path: &std::path::Path) -> Option<&str> {
+    path.to_str().filter(|text| ["http://", "https://"].iter().any(|scheme| text.starts_with(scheme)))
+}
+
+/// The error of Python's, if there is one; it is told once.
+pub fn interrupted(interrupt: &Interrupt) -> Option<PyErr> {
+    interrupt.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+impl RangeSource for Source {
+    fn want(&mut self, wanted: &[WantedRange]) {
+        self.inner.want(wanted);
+    }
+
+    fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        let mut left = patience;
+        loop {
+            let found = self.inner.next(left.min(SHORT))?;
+            left = left.saturating_sub(SHORT);
+            if found.is_some() || left.is_zero() {
+                return Ok(found);
+            }
+            if let Err(error) = Python::attach(|py| py.check_signals()) {
+                self.interrupt.lock().unwrap_or_else(PoisonError::into_inner).replace(error);
+                return Err(StreamError::Unreadable("interrupted".to_owned()));
+            }
+        }
+    }
+
+    fn total(&self) -> Option<u64> {
+        self.inner.total()
+    }
+
+    fn traffic(&self) -> Option<Traffic> {
+        self.inner.traffic()
+    }
+}
