@@ -35,7 +35,13 @@ const NAMED = ["html", "js", "json", "nginx", "text", "xml", "yaml"];
  * @type {Record<string, string[]>}
  */
 const ELSEWHERE = {
-  "README.md": ["html: e2e.test.js", "js: parts.test.js", "rust: a documentation test of the crate", "sh: the commands that run all tests"],
+  "README.md": [
+    "html: e2e.test.js",
+    "js: parts.test.js",
+    "rust: a documentation test of the crate",
+    "python: python/tests/test_pages.py",
+    "sh: the commands that run all tests",
+  ],
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
   "docs/hosting.md": ["sh: needs an account of S3"],
@@ -43,6 +49,7 @@ const ELSEWHERE = {
   "docs/howto/deformed.md": ["sh: the commands of movies.md are run"],
   "docs/howto/movies.md": ["sh: needs ffmpeg"],
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
+  "docs/howto/python.md": ["python: python/tests/test_pages.py"],
 };
 
 /** Pages that open without a volume: their test is below. */
