@@ -23,6 +23,7 @@ const source = (reflection) => {
 /** Headings that do not say what the page is where they stand among others. @type {Record<string, string>} */
 const TITLES = {
   "pkg-template/README.md": "The npm package",
+  "python/README.md": "The Python package",
   "examples/js/README.md": "Example projects: bundlers, React, Node",
 };
 
@@ -40,7 +41,7 @@ class Router extends KindRouter {
   getIdealBaseName(reflection) {
     if (!(reflection instanceof DocumentReflection)) return super.getIdealBaseName(reflection);
     const page = source(reflection) ?? reflection.name;
-    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace("examples/js/README", "howto/examples").replace(/\.md$/, "").toLowerCase();
+    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace("python/README", "python").replace("examples/js/README", "howto/examples").replace(/\.md$/, "").toLowerCase();
   }
 }
 

@@ -151,7 +151,7 @@ fn refined(
         let mut stats = client.step(PATIENCE, &mut |done| {
             updates += 1;
             let changed = done.refined + done.coarsened;
-            updates % UPDATES_A_LOOK != 0 || watch.goes_on("refine", changed, 0)
+            !updates.is_multiple_of(UPDATES_A_LOOK) || watch.goes_on("refine", changed, 0)
         })?;
         stats.add_work(&before);
         if client.is_complete(&stats) || !tell(client, watch) {

@@ -39,6 +39,7 @@ const ELSEWHERE = {
     "html: e2e.test.js",
     "js: parts.test.js",
     "rust: a documentation test of the crate",
+    "python: python/tests/test_pages.py",
     "sh: the commands that run all tests; `release` of xtask compiles the command with the page, cli/tests/command/view.rs views",
   ],
   "docs/csp-and-cors.md": ["text: headers"],
@@ -48,6 +49,7 @@ const ELSEWHERE = {
   "docs/howto/deformed.md": ["sh: the commands of movies.md are run"],
   "docs/howto/movies.md": ["sh: needs ffmpeg"],
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
+  "docs/howto/python.md": ["python: python/tests/test_pages.py"],
 };
 
 /** Pages that open without a volume: their test is below. */
