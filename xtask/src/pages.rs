@@ -35,7 +35,7 @@ pub fn run(args: &[String]) -> Result<()> {
     fs::write(pages.join(".nojekyll"), "")?;
     let sizes = sizes(pages)?;
     let all: u64 = sizes.iter().map(|(_, bytes)| bytes).sum();
-    for (path, bytes) in sizes.iter().filter(|(_, bytes)| *bytes > LARGEST) {
+    if let Some((path, bytes)) = sizes.iter().find(|(_, bytes)| *bytes > LARGEST) {
         bail!("{}: {bytes} bytes are more than such a host takes", path.display());
     }
     ensure!(all <= ALL, "{PAGES}: {all} bytes are more than such a host takes");
