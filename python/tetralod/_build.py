@@ -64,7 +64,7 @@ def build(
       of faces. All cells with a volume are split into tetrahedra that fit their neighbours, exactly as by the readers of files; the
       others are left out, which ``report["notes"]`` says. Without cells, ``kind="vertex", method="insert"`` fills the points with tetrahedra.
     - a data set of PyVista or VTK: an unstructured, structured, rectilinear or regular grid;
-    - a mesh of meshio;
+    - a mesh of meshio, but for its sets of points and cells and its field data;
     - a path, or a list of paths, which are time steps: what the command ``tetralod build`` reads.
 
     ``point_data`` and ``cell_data`` have an array (n,) or (n, components) for each name; ``cell_data`` may have a list with an array for each
