@@ -22,8 +22,8 @@ mod straighten;
 mod tet;
 mod tet_mesh;
 
-#[doc(hidden)]
 pub(crate) use adjacency::faces;
+#[doc(hidden)]
 pub use adjacency::{DisjointSets, FaceTable, Topology, boundary_faces, match_faces, neighbors, topology};
 #[doc(hidden)]
 pub use bit_set::BitSet;

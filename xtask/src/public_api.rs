@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
@@ -49,12 +50,29 @@ pub fn check() -> Result<()> {
     Ok(())
 }
 
+/// Is set where this program stands for rustdoc.
+const AS_RUSTDOC: &str = "XTASK_AS_RUSTDOC";
+
+/// Runs rustdoc with what only nightly versions do by themselves, if this program stands for it; its exit code then.
+pub fn as_rustdoc() -> Option<Result<ExitCode>> {
+    std::env::var_os(AS_RUSTDOC)?;
+    let mut rustdoc = Command::new("rustdoc");
+    rustdoc.args(std::env::args_os().skip(1)).env("RUSTC_BOOTSTRAP", "1");
+    Some(
+        rustdoc
+            .status()
+            .context("rustdoc")
+            .map(|status| if status.success() { ExitCode::SUCCESS } else { ExitCode::FAILURE }),
+    )
+}
+
 /// The public names of a crate, with their paths and kinds.
 fn names_of(library: &str) -> Result<BTreeSet<String>> {
     let args = ["rustdoc", "--package", library, "--lib", "--all-features", "--", "-Z", "unstable-options"];
     let mut command = shell::cargo(args);
-    // The format is no promise of rustdoc's yet; rust-toolchain.toml names the version that this reads.
-    command.args(["--output-format", "json"]).env("RUSTC_BOOTSTRAP", "1");
+    // The format is no promise of rustdoc's yet; rust-toolchain.toml names the version that this reads. rustdoc alone is told so: build
+    // scripts that heard of it would run again, and most crates be compiled again, now and by the next step.
+    command.args(["--output-format", "json"]).env("RUSTDOC", std::env::current_exe()?).env(AS_RUSTDOC, "1");
     shell::run(&mut command)?;
     let name = library.replace('-', "_");
     let path = format!("target/doc/{name}.json");

@@ -84,6 +84,7 @@ mod write_layers;
 mod xml;
 mod xz;
 
+#[doc(hidden)]
 pub use contents::Survey;
 pub use error::{ReadError, ReadReason};
 pub use in_memory::{FilesInMemory, StepInMemory};
@@ -98,8 +99,7 @@ pub use pvd::{Step, steps};
 pub use surface::{PointValues, write_csv, write_obj};
 pub use surface::{PolyData, write_ply, write_stl, write_vtp};
 #[doc(hidden)]
-pub use survey::format_of;
-pub use survey::survey;
+pub use survey::{format_of, survey};
 #[doc(hidden)]
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 #[doc(hidden)]
