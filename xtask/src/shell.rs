@@ -16,10 +16,17 @@ pub fn root() -> PathBuf {
     xtask.parent().map_or_else(|| xtask.to_path_buf(), Path::to_path_buf)
 }
 
-/// `program` with `args`, not started yet.
+/// `program` with `args`, not started yet. It does not hear what cargo says of this program: build scripts that listen to that would run
+/// again, and crates be compiled again, whenever cargo is started by hand in between.
 pub fn command<A: AsRef<OsStr>>(program: impl AsRef<OsStr>, args: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(program);
     command.args(args);
+    for (name, _) in std::env::vars_os() {
+        let text = name.to_string_lossy();
+        if text.starts_with("CARGO_MANIFEST_") || text.starts_with("CARGO_PKG_") {
+            command.env_remove(&name);
+        }
+    }
     command
 }
 
