@@ -155,6 +155,7 @@ test("as many fields are ticked as memory has room for", async () => {
     await page.waitForFunction(() => document.activeElement?.textContent === "Build", undefined, { timeout: PATIENCE });
     const count = await dialog.locator("fieldset.choices input:checked").count();
     await dialog.getByRole("button", { name: "Cancel" }).click();
+    await dialog.waitFor({ state: "detached" });
     return count;
   };
   assert.equal(await ticked(arrays.slice(0, 3)), 3);

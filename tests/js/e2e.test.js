@@ -377,7 +377,7 @@ test("the pointer reads values, clicks keep probes, and two of them give a plot"
   assert.match(await page.locator("#readout").innerText(), /density\s+[\d.]+\s+position\s.*cell size\s.*cell error\s+[\d.]+ %/s);
   await page.mouse.click(...at(0.45, 0.5));
   await page.locator(".card").waitFor();
-  await page.mouse.click(...at(0.58, 0.4));
+  await page.mouse.click(...at(0.4, 0.42));
   await page.locator("#plot path").waitFor();
   assert.equal(await page.locator(".card").count(), 2);
   const before = await boxes(page, ".pins circle");

@@ -1,6 +1,7 @@
 //! MT files that were built for `tetralod view`, kept until their inputs change: each with a JSON that says of what it was built.
 
 use anyhow::{Context, Result};
+use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
 use std::fs::{self, Metadata};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -67,7 +68,7 @@ struct Origin {
 
 impl Cache {
     pub fn of(folder: Option<PathBuf>, options: &[String]) -> Result<Self> {
-        let usual = || dirs::cache_dir().map(|folder| folder.join("tetralod"));
+        let usual = || Some(choose_base_strategy().ok()?.cache_dir().join("tetralod"));
         let folder = folder.or_else(usual).context("there is no folder for caches; give one by --cache")?;
         let usual = BUILD.map(str::to_owned).to_vec();
         Ok(Self { folder, options: if options.is_empty() { usual } else { options.to_vec() } })

@@ -3,10 +3,11 @@
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::Read;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use crate::error::{At, ReadError, ReadReason};
 use crate::in_memory::FilesInMemory;
+use crate::listed::{elsewhere, expect_below};
 use crate::memory::{FileBytes, Held, MemoryLimit};
 
 /// Where files are.
@@ -128,20 +129,6 @@ impl<'a> FilesOf<'a> {
 /// The bytes of a file that is in memory already.
 fn in_memory(bytes: &[u8]) -> FileBytes<'_> {
     FileBytes::new(bytes, Held::default())
-}
-
-/// Why a file in another folder is refused.
-fn elsewhere(what: String) -> ReadReason {
-    ReadReason::unsupported(what, "put the files beside the one that refers to them, or below it")
-}
-
-/// Refuses the name of a file that is not beside the one that names it, or below.
-pub(super) fn expect_below(name: &str) -> Result<(), ReadReason> {
-    let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
-    if name.is_empty() || !Path::new(name).components().all(below) {
-        return Err(elsewhere(format!("a file in another folder (\"{name}\")")));
-    }
-    Ok(())
 }
 
 /// Where the file is that the one at `path` calls `name`: in its folder or below, also where links lead. It must be a file, for a pipe or a

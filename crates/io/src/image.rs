@@ -5,9 +5,9 @@ use crate::error::{At, ReadError, ReadReason};
 use crate::grid::{ALONG_THE_AXES, Extent, Placement, placed};
 use crate::grid_parts::{InParts, whole_extent};
 use crate::listed::for_each_file;
+use crate::options::{Beside, ReadOptions};
 use crate::vtu;
 use crate::xml::Document;
-use crate::{Beside, ReadOptions};
 use tetralod::mesh::{Field, TetMesh};
 
 /// Reads a document of type `ImageData`, or `PImageData` with the files that it lists, and its time.

@@ -71,8 +71,10 @@ mod polyhedra;
 mod pvd;
 mod pvtu;
 mod raw;
+mod reading;
 mod scanner;
 mod shares;
+mod steps_in_memory;
 mod structured;
 mod surface;
 mod survey;
@@ -87,7 +89,7 @@ mod xz;
 #[doc(hidden)]
 pub use contents::Survey;
 pub use error::{ReadError, ReadReason};
-pub use in_memory::{FilesInMemory, StepInMemory};
+pub use in_memory::FilesInMemory;
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
 #[doc(hidden)]
@@ -95,6 +97,7 @@ pub use pieces::{PieceCounts, Pieces};
 #[doc(hidden)]
 pub use pvd::write_pvd;
 pub use pvd::{Step, steps};
+pub use steps_in_memory::StepInMemory;
 #[doc(hidden)]
 pub use surface::{PointValues, write_csv, write_obj};
 pub use surface::{PolyData, write_ply, write_stl, write_vtp};
@@ -111,12 +114,9 @@ pub use write_layers::write_vti_layers;
 use std::path::Path;
 
 use crate::beside::{FilesOf, Source};
-use crate::error::{At, in_file};
-use crate::file_kind::{lower_extension, without_gz, without_mark};
-use crate::listed::not_read;
-use crate::options::Beside;
-use crate::xml::IN_FILES;
-use tetralod::mesh::{TetMesh, straighten};
+use crate::error::At;
+use crate::reading::{expanded, read_files, read_unsettled, settled};
+use tetralod::mesh::TetMesh;
 
 /// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
 ///
@@ -136,30 +136,6 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     read_files(&FilesOf::on_disk(path, &options.memory), options)
 }
 
-/// The mesh of a file and those that it needs.
-fn read_files(files: &FilesOf<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let read = read_unsettled(files, options).map(settled)?;
-    expanded(read, options).in_file(&files.name())
-}
-
-/// The mesh as callers get it: finite numbers at points that no cell uses, no cells that fold because they were cut into straight
-/// tetrahedra, and with all notes in words.
-fn settled(mut mesh: TetMesh) -> TetMesh {
-    fields::settle_unused(&mut mesh);
-    straighten(&mut mesh);
-    mesh.notes.extend(mesh.input.lines());
-    mesh
-}
-
-/// A mesh with the points and tetrahedra of its grid.
-fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadReason> {
-    if let Some(grid) = mesh.grid.filter(|_| mesh.is_grid_alone()) {
-        options.memory.take(grid::bytes(grid.dims))?;
-    }
-    mesh.expand_grid();
-    Ok(mesh)
-}
-
 /// As [`read_with`], but a regular grid without values at its cells comes without points and tetrahedra, which follow from it: see
 /// [`TetMesh::of_grid_alone`].
 ///
@@ -168,33 +144,6 @@ fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadRea
 #[doc(hidden)]
 pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     read_unsettled(&FilesOf::on_disk(path, &options.memory), options).map(settled)
-}
-
-fn read_unsettled(files: &FilesOf<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    if matches!(files.source, Source::Disk) && files.given.is_dir() {
-        return Err(foreign::refused_folder(files.given)).in_file(&files.name());
-    }
-    let mut mesh = match lower_extension(files.given).as_str() {
-        "json" | "raw" => read_raw_by_sidecar(files, &options.memory)?,
-        "node" | "ele" => formats::tetgen::read(files, options)?,
-        _ => match read_ranges(files, options) {
-            Some(read) => read?,
-            None => read_in(&files.name(), &files.load_given()?, options, &|file| files.load(file))?,
-        },
-    };
-    mesh.input.files.0 = files.all_read();
-    Ok(mesh)
-}
-
-/// Reads what is wanted of a file of a format that need not be read as a whole; none if it is another one.
-#[cfg(feature = "hdf5")]
-fn read_ranges(files: &FilesOf<'_>, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
-    formats::hdf5::read_given(files, options)
-}
-
-#[cfg(not(feature = "hdf5"))]
-fn read_ranges(_: &FilesOf<'_>, _: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
-    None
 }
 
 /// Reads a mesh or grid from the bytes of a file; `name` is used in errors alone.
@@ -219,27 +168,6 @@ pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Resul
     Ok(mesh)
 }
 
-/// Reads a file that may refer to others.
-fn read_in(
-    name: &str,
-    bytes: &[u8],
-    options: &ReadOptions,
-    beside: Beside<'_>,
-) -> Result<TetMesh, ReadError> {
-    let unpacked = packed::unpacked(bytes, &options.memory).in_file(name)?;
-    let (bytes, name) = (&*unpacked, without_gz(name));
-    let start = without_mark(bytes);
-    let result = if bytes.starts_with(legacy::MAGIC) {
-        legacy::read(bytes, options)
-    } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
-        read_xml(start, options, beside)
-    } else {
-        formats::read(name, bytes, options, beside)
-            .unwrap_or_else(|| Err(foreign::refused(name, bytes)).at(String::new))
-    };
-    result.map_err(|e| in_file(e, name))
-}
-
 /// Reads raw samples, given their JSON sidecar:
 /// `{"dims": [2, 2, 2], "type": "uint8", "endian": "little", "spacing": [1, 1, 1], "origin": [0, 0, 0], "field": "density"}`,
 /// of which only `dims` and `type` are needed. Samples run x fastest, then y, then z. `name` is used in errors alone.
@@ -252,40 +180,4 @@ pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, R
     let mesh =
         raw::Sidecar::parse(sidecar).and_then(|s| expanded(s.mesh(samples, &options.memory)?, &options));
     mesh.in_file(name)
-}
-
-fn read_raw_by_sidecar(files: &FilesOf<'_>, memory: &MemoryLimit) -> Result<TetMesh, ReadError> {
-    let sidecar = sidecar(files)?;
-    let samples_path = match &sidecar.file {
-        _ if lower_extension(files.given) == "raw" => files.given.to_owned(),
-        Some(file) => files.given.with_file_name(file),
-        None => files.given.with_extension("raw"),
-    };
-    let samples = files.load_one(&samples_path)?;
-    sidecar.mesh(&samples, memory).in_file(&samples_path.display().to_string())
-}
-
-/// The sidecar of raw samples, of which either is given.
-fn sidecar(files: &FilesOf<'_>) -> Result<raw::Sidecar, ReadError> {
-    let is_samples = lower_extension(files.given) == "raw";
-    let path = if is_samples { &files.given.with_extension("json") } else { files.given };
-    raw::Sidecar::parse(&files.load_one(path)?).in_file(&path.display().to_string())
-}
-
-fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {
-    let document = xml::Document::parse(bytes)?;
-    let (mut mesh, of_pieces) = match document.kind.as_str() {
-        "UnstructuredGrid" => (vtu::read(&document, options)?, None),
-        "PUnstructuredGrid" => pvtu::read(&document, options, beside)?,
-        kind => match kind.strip_prefix(IN_FILES).unwrap_or(kind) {
-            "ImageData" => image::read(&document, options, beside)?,
-            structured::RECTILINEAR | structured::CURVILINEAR => {
-                structured::read(&document, options, beside)?
-            }
-            _ => return Err(not_read(kind)).at(String::new),
-        },
-    };
-    let time = document.time().or(of_pieces);
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
-    Ok(mesh)
 }

@@ -1,5 +1,7 @@
 //! Documents that list files with the pieces of a grid.
 
+use std::path::{Component, Path};
+
 use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::file_kind::without_mark;
 use crate::memory::MemoryLimit;
@@ -65,4 +67,18 @@ pub(super) fn not_read(kind: &str) -> ReadReason {
         ),
     };
     ReadReason::unsupported(what, remedy)
+}
+
+/// Why a file in another folder is refused.
+pub(super) fn elsewhere(what: String) -> ReadReason {
+    ReadReason::unsupported(what, "put the files beside the one that refers to them, or below it")
+}
+
+/// Refuses the name of a file that is not beside the one that names it, or below.
+pub(super) fn expect_below(name: &str) -> Result<(), ReadReason> {
+    let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if name.is_empty() || !Path::new(name).components().all(below) {
+        return Err(elsewhere(format!("a file in another folder (\"{name}\")")));
+    }
+    Ok(())
 }

@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
-use crate::beside::{self, FilesOf, expect_below};
+use crate::beside::{self, FilesOf};
 use crate::error::{At, ReadError, ReadReason};
 use crate::file_kind::{lower_extension, without_gz};
+use crate::listed::expect_below;
 use crate::write::escaped;
 use crate::xml::Attributes;
 use crate::{MemoryLimit, formats, packed};

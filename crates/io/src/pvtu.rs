@@ -10,9 +10,9 @@ use std::collections::{HashMap, HashSet};
 use crate::error::{At, ReadError, ReadReason};
 use crate::listed::for_each_file;
 use crate::numbering::Numbering;
+use crate::options::{Beside, ReadOptions};
 use crate::vtu::{NumberPoints, first_number, join, readers};
 use crate::xml::Document;
-use crate::{Beside, ReadOptions};
 use tetralod::geom::bits_of;
 use tetralod::mesh::TetMesh;
 

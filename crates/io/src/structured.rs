@@ -6,9 +6,9 @@ use crate::fields::component_of;
 use crate::grid::{Extent, MAX_GRID_POINTS, checked_dims, dims_in, mesh, most_tets, rectilinear};
 use crate::grid_parts::{InParts, expect_values, extent_of, whole_extent};
 use crate::listed::for_each_file;
+use crate::options::{Beside, ReadOptions};
 use crate::vtu::{self, PieceReader};
 use crate::xml::Document;
-use crate::{Beside, ReadOptions};
 use tetralod::mesh::{Field, TetMesh};
 
 /// Reads a document of type `RectilinearGrid` or `StructuredGrid`, or a list of files with the pieces of one, and its time.

@@ -8,11 +8,10 @@ use crate::error::{At, ReadError, in_file};
 use crate::file_kind::{lower_extension, without_mark};
 use crate::formats::tetgen;
 use crate::listed::{for_each_file, not_read};
+use crate::options::Beside;
+use crate::reading::{read_files, sidecar};
 use crate::xml::{Document, IN_FILES};
-use crate::{
-    Beside, CellData, MemoryLimit, ReadOptions, foreign, formats, image, legacy, packed, read_files, sidecar,
-    structured, vtu,
-};
+use crate::{CellData, MemoryLimit, ReadOptions, foreign, formats, image, legacy, packed, structured, vtu};
 use tetralod::geom::Bounds;
 use tetralod::mesh::{Field, TetMesh};
 

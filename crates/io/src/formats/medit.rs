@@ -9,8 +9,8 @@ use crate::formats::draft::Draft;
 use crate::formats::medit_cells::{Cells, KINDS, expect_known, ordering};
 use crate::memory::FileBytes;
 use crate::number::NumberType;
+use crate::options::{Beside, ReadOptions};
 use crate::scanner::Scanner;
-use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
 /// The first word of every file.

@@ -7,8 +7,8 @@ use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::formats::medit::{FLAT, Layout, Numbers, Parts, beside_if, expect_three};
 use crate::formats::medit_cells::{expect_known, refused};
 use crate::number::NumberType;
+use crate::options::{Beside, ReadOptions};
 use crate::scanner::Scanner;
-use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
 /// Numbers of sections that are read; those of cells and solutions are with their names.

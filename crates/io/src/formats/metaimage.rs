@@ -9,8 +9,8 @@ use crate::formats::volume::{
     unpacked, wrong_dimensions,
 };
 use crate::number::NumberType;
+use crate::options::{Beside, ReadOptions};
 use crate::scanner::Scanner;
-use crate::{Beside, ReadOptions};
 use flate2::read::ZlibDecoder;
 use tetralod::mesh::TetMesh;
 

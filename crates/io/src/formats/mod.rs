@@ -32,8 +32,8 @@ use std::path::Path;
 
 use crate::beside::FilesOf;
 use crate::error::ReadError;
+use crate::options::{Beside, ReadOptions};
 use crate::scanner::Scanner;
-use crate::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
 /// A format that is recognised by its content.

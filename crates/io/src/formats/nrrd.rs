@@ -11,8 +11,9 @@ use crate::formats::volume::{
     numbers, unpacked, wrong_dimensions,
 };
 use crate::number::NumberType;
+use crate::options::{Beside, ReadOptions};
 use crate::scanner::Scanner;
-use crate::{Beside, MemoryLimit, ReadOptions, error};
+use crate::{MemoryLimit, error};
 use flate2::read::MultiGzDecoder;
 use tetralod::mesh::TetMesh;
 

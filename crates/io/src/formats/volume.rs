@@ -6,7 +6,7 @@ use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::{Collector, component_name, in_order};
 use crate::grid::{GridValues, Placement, checked_dims};
 use crate::number::NumberType;
-use crate::{Beside, ReadOptions};
+use crate::options::{Beside, ReadOptions};
 use tetralod::mesh::TetMesh;
 
 /// Most values of a sample.
