@@ -6,11 +6,13 @@
 //! - It conforms: pieces of neighbours share their faces, whose triangles depend on the corners of the face alone.
 //! - Points keep their numbers; those on edges that are cut come behind them, as the isosurfaces have them. Tetrahedra that are whole
 //!   keep their numbers, and the first piece of each other one has its number; all other pieces come behind. What is left out is a free slot.
-//! - Same mesh, same bytes.
+//! - Same mesh, same bytes; and how pieces are cut depends on the places of points, not on their numbers, which another way to the same mesh
+//!   gives otherwise.
 
 use super::MeshView;
 use super::marching::{Crossing, Crossings, Polygon};
 use crate::mesh::{FACES, NONE};
+use std::cmp::Ordering;
 
 /// A mesh within a range of a field.
 #[derive(Clone, Debug)]
@@ -29,6 +31,7 @@ pub struct MeshWithin {
 struct Cutter<'a> {
     by: &'a [f64],
     ends: [f64; 2],
+    positions: &'a [[f64; 3]],
     /// Points of the mesh.
     points: u32,
     crossings: Crossings,
@@ -51,9 +54,10 @@ impl Face {
         &self.corners[..self.len]
     }
 
-    /// The triangles of the face, all with its smallest corner.
-    fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
-        let smallest = (0..self.len).min_by_key(|i| self.corners[*i]).unwrap_or(0);
+    /// The triangles of the face, all with its first corner in the order of places.
+    fn triangles(&self, cutter: &Cutter<'_>) -> impl Iterator<Item = [u32; 3]> {
+        let smallest =
+            (0..self.len).min_by(|&i, &j| cutter.compare(self.corners[i], self.corners[j])).unwrap_or(0);
         let corner = move |i: usize| self.corners[(smallest + i) % self.len];
         (2..self.len).map(move |i| [corner(0), corner(i - 1), corner(i)])
     }
@@ -63,6 +67,24 @@ impl Cutter<'_> {
     fn is_within(&self, point: u32) -> bool {
         let value = self.by[point as usize];
         value >= self.ends[0] && value <= self.ends[1]
+    }
+
+    /// Where a point is, of the mesh or a new one.
+    fn place(&self, point: u32) -> [f64; 3] {
+        match point.checked_sub(self.points) {
+            None => self.positions[point as usize],
+            Some(new) => {
+                let crossing = &self.crossings.list[new as usize];
+                let end = self.ends[crossing.which as usize];
+                crossing.place(self.positions, crossing.fraction(end, |point| self.by[point as usize]))
+            }
+        }
+    }
+
+    /// The order of points by their places; of those at one place by their numbers.
+    fn compare(&self, a: u32, b: u32) -> Ordering {
+        let ([x, y, z], [u, v, w]) = (self.place(a), self.place(b));
+        x.total_cmp(&u).then(y.total_cmp(&v)).then(z.total_cmp(&w)).then(a.cmp(&b))
     }
 
     /// Adds the points between two corners, from the first to the second.
@@ -119,9 +141,10 @@ impl Cutter<'_> {
         faces[4] = self.opened(tet, 0);
         faces[5] = self.opened(tet, 1);
         let faces = faces.iter().filter(|face| face.len > 2);
-        let Some(apex) = faces.clone().flat_map(Face::corners).min().copied() else { return };
+        let corners = faces.clone().flat_map(Face::corners).copied();
+        let Some(apex) = corners.min_by(|&a, &b| self.compare(a, b)) else { return };
         let opposite = faces.filter(|face| !face.corners().contains(&apex));
-        pieces.extend(opposite.flat_map(Face::triangles).map(|[a, b, c]| [a, c, b, apex]));
+        pieces.extend(opposite.flat_map(|face| face.triangles(self)).map(|[a, b, c]| [a, c, b, apex]));
     }
 }
 
@@ -133,7 +156,8 @@ impl MeshWithin {
     /// If the mesh names a point or a neighbour that it does not have, or there are fewer numbers than points.
     pub fn of(mesh: &MeshView<'_>, by: &[f64], range: [f64; 2]) -> Self {
         let points = mesh.positions.len() as u32;
-        let mut cutter = Cutter { by, ends: range, points, crossings: Crossings::default() };
+        let mut cutter =
+            Cutter { by, ends: range, positions: mesh.positions, points, crossings: Crossings::default() };
         let within: Vec<bool> = (0..points).map(|point| cutter.is_within(point)).collect();
         let is_whole = |tet: &[u32; 4]| tet[0] != NONE && tet.iter().all(|&point| within[point as usize]);
         let mut tets = vec![[NONE; 4]; mesh.tets.len()];
