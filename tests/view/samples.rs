@@ -59,7 +59,7 @@ fn the_mean_of_many_pictures_gets_to_what_pixels_cover() {
         renderer.update_mesh(&scene.view(), None).unwrap();
         let look = twin::plain();
         renderer.resize(SIZE.map(|s| FINE * s));
-        let exact = shrunk(&mean(&mut renderer, &look, 4));
+        let exact = shrunk(&mean(&mut renderer, &look, 16));
         renderer.resize(SIZE);
         assert_eq!(renderer.drawn(), 0);
         assert!(!renderer.draw_again().unwrap(), "there is nothing to draw again");
