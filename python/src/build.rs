@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::Coded;
 use tetralod::format::{EncodeOptions, encode};
-use tetralod::mesh::{self, Field, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh};
+use tetralod::mesh::{self, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh};
 use tetralod::mt::{AveragedField, MtKind};
 use tetralod_build::{
     BuildConfig, BuildCriterion, BuildError, BuildSummary, Construction, ConstructionChoice, FieldPrecision,
@@ -123,7 +123,10 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
     };
     mesh.settle_cells(options.cell_to_point, &config.preserve);
     mesh.add_geometry_fields(&config.fields);
-    set_units(&mut mesh, &options.units)?;
+    let unknown = |(name, _): &(String, String)| {
+        Failure::new("bad-option", format!("option `units`: there is no field '{name}'"))
+    };
+    mesh.set_units(&options.units).map_err(unknown)?;
     let built = build_with(mesh, &config, &mut |step| {
         let goes_on = watch.goes_on(step.stage, step.done, step.total);
         if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
@@ -229,23 +232,6 @@ fn expect_points(mesh: &TetMesh, config: &BuildConfig) -> Result<(), Failure> {
     }
     let what = "there are points but no tetrahedra; kind=\"vertex\" with method=\"insert\" makes an MT of points alone";
     Err(Failure::new("bad-mesh", what))
-}
-
-fn set_units(mesh: &mut TetMesh, units: &[(String, String)]) -> Result<(), Failure> {
-    for (name, unit) in units {
-        let is_meant = |field: &Field| {
-            field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
-        };
-        let mut found = mesh.input.other_fields.iter().any(is_meant);
-        for field in mesh.fields.iter_mut().filter(|field| is_meant(field)) {
-            field.unit.clone_from(unit);
-            found = true;
-        }
-        if !found {
-            return Err(Failure::new("bad-option", format!("option `units`: there is no field '{name}'")));
-        }
-    }
-    Ok(())
 }
 
 /// What has this name.

@@ -46,6 +46,31 @@ impl PartialEq for TetMesh {
     }
 }
 
+impl TetMesh {
+    /// Sets the units of fields, or of all components of vectors, by their names. What was left out when the mesh was read has none.
+    ///
+    /// # Errors
+    /// The first name, with its unit, that the input does not have.
+    #[doc(hidden)]
+    pub fn set_units<'a>(&mut self, units: &'a [(String, String)]) -> Result<(), &'a (String, String)> {
+        for named in units {
+            let (name, unit) = named;
+            let is_meant = |field: &Field| {
+                field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+            };
+            let mut found = self.input.other_fields.iter().any(is_meant);
+            for field in self.fields.iter_mut().filter(|field| is_meant(field)) {
+                field.unit.clone_from(unit);
+                found = true;
+            }
+            if !found {
+                return Err(named);
+            }
+        }
+        Ok(())
+    }
+}
+
 impl From<TetMesh> for Cow<'_, TetMesh> {
     fn from(mesh: TetMesh) -> Self {
         Cow::Owned(mesh)

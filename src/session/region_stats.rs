@@ -22,7 +22,7 @@ impl Session {
         self.view();
         let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else { return Vec::new() };
         let Some(count) = mt.regions().map(|regions| regions.all.len()) else { return Vec::new() };
-        let fields = FieldStats::of_regions(&self.last_view(), front.mesh().regions(), count);
+        let fields = FieldStats::of_regions(&self.last_view(), &self.shown_regions(), count);
         let errors = front.errors_by_region(mt, self.field, count);
         let least = mt.info().floor(self.field);
         let one = |(region, (field, error)): (u16, (FieldStats, ErrorCode))| RegionStats {

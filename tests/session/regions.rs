@@ -4,7 +4,7 @@
 use crate::support::meshes::parted;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::refine::{Need, Request};
-use tetralod::session::{RegionStats, Session, TetQuantity};
+use tetralod::session::{RegionStats, Session, TetQuantity, Within};
 use tetralod::view::FieldStats;
 use tetralod_build::{BuildConfig, build};
 
@@ -63,23 +63,28 @@ fn a_linear_field_has_the_statistics_of_closed_forms_in_each_region() {
 fn regions_add_up_to_the_whole_and_hidden_ones_are_left_out() {
     let mut session = opened();
     for error in [0.3, 0.02, 0.0] {
-        session.show_regions(None);
         session.refine(&Request::within(error)).expect("a good request");
-        let (whole, parts) = (FieldStats::of(&session.view()), session.region_stats());
-        let sum = |of: fn(&FieldStats) -> f64| parts.iter().map(|part| of(&part.field)).sum::<f64>();
-        assert!((sum(FieldStats::volume) - whole.volume()).abs() < 1e-12);
-        assert!((sum(FieldStats::integral) - whole.integral()).abs() < 1e-12);
-        assert_eq!(parts.iter().map(|part| part.field.tetrahedra()).sum::<u32>(), whole.tetrahedra());
-        let ends = |end: usize| parts.iter().map(move |part| part.field.range()[end]);
-        let range = [ends(0).fold(f64::INFINITY, f64::min), ends(1).fold(f64::NEG_INFINITY, f64::max)];
-        assert_eq!(range, whole.range());
-        // Second moments add up, too.
-        let moment = |field: &FieldStats| field.volume() * (field.deviation().powi(2) + field.mean().powi(2));
-        assert!((sum(moment) - moment(&whole)).abs() < 1e-12);
-        session.show_regions(Some(&[1]));
-        let [one] = &session.region_stats()[..] else { panic!("one region is shown") };
-        assert_eq!((one.region, one.field.volume()), (1, parts[1].field.volume()));
-        assert_eq!(FieldStats::of(&session.view()).volume(), one.field.volume());
+        // As they are, and where each is cut into pieces.
+        for is_cut in [false, true] {
+            session.show_regions(None);
+            session.show_within(is_cut.then_some(Within { field: LINEAR, range: [-0.7, 0.4], is_cut }));
+            let (whole, parts) = (FieldStats::of(&session.view()), session.region_stats());
+            let sum = |of: fn(&FieldStats) -> f64| parts.iter().map(|part| of(&part.field)).sum::<f64>();
+            assert!((sum(FieldStats::volume) - whole.volume()).abs() < 1e-12);
+            assert!((sum(FieldStats::integral) - whole.integral()).abs() < 1e-12);
+            assert_eq!(parts.iter().map(|part| part.field.tetrahedra()).sum::<u32>(), whole.tetrahedra());
+            let ends = |end: usize| parts.iter().map(move |part| part.field.range()[end]);
+            let range = [ends(0).fold(f64::INFINITY, f64::min), ends(1).fold(f64::NEG_INFINITY, f64::max)];
+            assert_eq!(range, whole.range());
+            // Second moments add up, too.
+            let moment =
+                |field: &FieldStats| field.volume() * (field.deviation().powi(2) + field.mean().powi(2));
+            assert!((sum(moment) - moment(&whole)).abs() < 1e-12);
+            session.show_regions(Some(&[1]));
+            let [one] = &session.region_stats()[..] else { panic!("one region is shown") };
+            assert_eq!((one.region, one.field.volume()), (1, parts[1].field.volume()));
+            assert_eq!(FieldStats::of(&session.view()).volume(), one.field.volume());
+        }
     }
 }
 

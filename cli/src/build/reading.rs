@@ -6,8 +6,8 @@ use crate::output::{self, Verbosity};
 use crate::parts::InPieces;
 use crate::repair::Repair;
 use crate::{files, input};
-use anyhow::Result;
-use tetralod::mesh::{Field, GeometryField, RepairLevel, RepairReport, TetMesh};
+use anyhow::{Result, anyhow};
+use tetralod::mesh::{GeometryField, RepairLevel, RepairReport, TetMesh};
 use tetralod_build::BuildConfig;
 use tetralod_build::parts::PartsError;
 use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
@@ -65,23 +65,8 @@ impl BuildOptions {
     }
 
     fn set_units(&self, mesh: &mut TetMesh) -> Result<()> {
-        for (name, unit) in &self.units {
-            let is_meant = |field: &&mut Field| {
-                field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
-            };
-            let mut found = 0;
-            mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
-                field.unit.clone_from(unit);
-                found += 1;
-            });
-            let is_other = |field: &Field| {
-                field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
-            };
-            if found == 0 && !mesh.input.other_fields.iter().any(is_other) {
-                anyhow::bail!("--unit {name}={unit}: there is no field '{name}'");
-            }
-        }
-        Ok(())
+        mesh.set_units(&self.units)
+            .map_err(|(name, unit)| anyhow!("--unit {name}={unit}: there is no field '{name}'"))
     }
 
     /// The pieces of the input, if it is a list of such that can be read one by one; `prepare` does what the options say to each.

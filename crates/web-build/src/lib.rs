@@ -220,7 +220,10 @@ impl MeshBuilder {
         };
         mesh.settle_cells(cells, &config.preserve);
         mesh.add_geometry_fields(&config.fields);
-        set_units(&mut mesh, &units)?;
+        let unknown = |(name, _): &(String, String)| {
+            WebError::bad_option("units", &format!("there is no field '{name}'"))
+        };
+        mesh.set_units(&units).map_err(unknown)?;
         let built = builder::build_with(mesh, &config, &mut |step| stages.step(&step));
         let built = built.map_err(|error| in_input(&name, &error))?;
         stages.begin("encode")?;
@@ -305,23 +308,6 @@ fn expect_points(mesh: &TetMesh, config: &BuildConfig, name: &str) -> Result<(),
     }
     let what = "there are points but no tetrahedra; method \"insert\" with kind \"vertex\" makes an MT of points alone";
     Err(WebError::new("bad-mesh", format!("{name}: {what}")))
-}
-
-fn set_units(mesh: &mut TetMesh, units: &[(String, String)]) -> Result<(), WebError> {
-    for (name, unit) in units {
-        let is_meant = |field: &&mut Field| {
-            field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
-        };
-        let mut found = false;
-        mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
-            field.unit.clone_from(unit);
-            found = true;
-        });
-        if !found {
-            return Err(WebError::bad_option("units", &format!("there is no field '{name}'")));
-        }
-    }
-    Ok(())
 }
 
 #[derive(Serialize)]
