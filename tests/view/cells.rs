@@ -21,7 +21,8 @@ fn solid(shrunk: f32) -> CellStyle {
 
 fn cameras() -> [Camera; 2] {
     let mut perspective = Camera::home(&UNIT, twin::aspect(SIZE));
-    perspective.zoom(0.9);
+    perspective.fit_around(&UNIT, twin::aspect(SIZE));
+    perspective.zoom(0.8);
     let mut parallel = perspective;
     parallel.orbit(1.1, -0.3);
     parallel.set_projection(Projection::Orthographic);
