@@ -186,12 +186,18 @@ fn a_movie_has_the_pictures_that_single_ones_are() {
     let files = folder.names();
     assert_eq!(files.iter().filter(|name| name.ends_with(".png")).count(), 4, "{files:?}");
     let pictures = paths.each_ref().map(|path| Picture::read(path));
-    let turned = ["0,0", "90,0", "180,0", "270,0"];
-    for (picture, turn) in pictures.iter().zip(turned) {
-        // Of a cube that is turned by quarters, each picture alone has the same distance.
-        let alone = draw(&mt, &one, &["--mode", "boundary", "--turn", turn]);
-        assert!(picture.differing(&alone) < 20, "{turn}");
+    for (picture, turn) in pictures.iter().zip(["0,0", "90,0", "180,0", "270,0"]) {
+        // Of a cube that is turned by quarters, all pictures have the same distance.
+        report(&folder.path("b.png"), &["--turn", turn]);
+        let first = Picture::read(&folder.path("b-0001.png"));
+        assert!(picture.differing(&first) < 20, "{turn}");
     }
+    // A picture alone fills its frame more, with what is seen of the model in its middle.
+    let alone = json(&[&["render", &mt, "-o", &one, "--json"], &SMALL[..], &["--mode", "boundary"]].concat());
+    let [near, far] =
+        [&alone, &told].map(|report| report["camera"]["distance"].as_f64().expect("a distance"));
+    assert!(near < far && near > 0.8 * far, "{near} {far}");
+    assert_eq!(told["camera"]["target"], serde_json::json!([0.5, 0.5, 0.5]));
     assert!(pictures[1].differing(&pictures[0]) > 300);
     // One file has the same, exactly or in 256 colours.
     assert_eq!(report(&apng, &[])["fps"], 20.0);
