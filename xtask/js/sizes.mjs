@@ -23,13 +23,13 @@ const LIMITS = {
   "./three": 2_500,
   "./vtk": 2_500,
   "./build": 4_000,
-  "./inline": 405_000,
+  "./inline": 416_000,
   "./worker": 10_800,
   "./viewer-worker": 20_400,
   "./build-worker": 5_500,
-  "./core.wasm": 307_000,
-  "./viewer.wasm": 480_000,
-  "./build.wasm": 582_000,
+  "./core.wasm": 316_000,
+  "./viewer.wasm": 499_000,
+  "./build.wasm": 898_000,
 };
 
 const folder = resolve(process.argv[2]);
