@@ -46,7 +46,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use usage::refuse_usage;
 
-/// Very large tetrahedral volumes for web pages: builds, inspects and checks MT files.
+/// Results of simulations and scans with millions of tetrahedra in a web page: `tetralod view FILE` shows one. Builds, inspects, draws and checks MT files.
 #[derive(Parser)]
 #[command(name = "tetralod", version, arg_required_else_help = true)]
 struct Arguments {
@@ -56,6 +56,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    View(view::Arguments),
     Generate(generate::Arguments),
     Build(Box<build::Arguments>),
     Part(Box<part::Arguments>),
@@ -73,7 +74,6 @@ enum Command {
     Verify(verify::Arguments),
     Bench(bench::Arguments),
     Serve(serve::Arguments),
-    View(view::Arguments),
     Completions(completions::Arguments),
 }
 

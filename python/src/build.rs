@@ -6,8 +6,6 @@ use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 use serde::Serialize;
-use std::collections::BTreeSet;
-use std::fs;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -80,8 +78,6 @@ struct Report {
     repaired: String,
     repair: Option<Repair>,
     averaged: Vec<AveragedField>,
-    /// The files that were read, at their places without links.
-    inputs: BTreeSet<PathBuf>,
     notes: Vec<String>,
 }
 
@@ -114,7 +110,6 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
     let (config, level) = (options.config()?, options.level()?);
     let (name, mesh) = input.read(&options, &config, watch)?;
     let notes = mesh.notes.clone();
-    let inputs = mesh.input.files.0.iter().filter_map(|file| fs::canonicalize(file).ok()).collect();
     watch.begin("repair")?;
     let bad_mesh = |error: MeshError| Failure::new("bad-mesh", format!("{name}: {error}"));
     let (mut mesh, repaired, repair) = if mesh.tets.is_empty() {
@@ -156,7 +151,6 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
         repaired,
         repair,
         averaged,
-        inputs,
         notes,
     };
     let report =

@@ -167,15 +167,10 @@ def test_ctrl_c_ends_a_wait():
 
         thread = threading.Thread(target=interrupt)
         thread.start()
-        # What a shell starts in the background ignores the signal, and Python with it.
-        before = signal.signal(signal.SIGINT, signal.default_int_handler)
-        try:
-            with pytest.raises(KeyboardInterrupt):
-                tetralod.open(f"http://127.0.0.1:{server.getsockname()[1]}/a.mt")
-        finally:
-            signal.signal(signal.SIGINT, before)
-            ended.set()
-            thread.join()
+        with pytest.raises(KeyboardInterrupt):
+            tetralod.open(f"http://127.0.0.1:{server.getsockname()[1]}/a.mt")
+        ended.set()
+        thread.join()
 
 
 def test_the_command_is_in_the_package(tmp_path):

@@ -114,6 +114,7 @@ const around = (code) => `<!doctype html>
 
 for (const [name, html] of [
   ["README", await block("README.md", "```html\n<!doctype html>")],
+  ["README with the element", await block("README.md", "```html\n<script")],
   ["package's README", around(await block("pkg-template/README.md", "```js\nimport { Viewer }"))],
 ]) {
   test(`the page of the ${name} draws the volume`, async () => {

@@ -2,6 +2,7 @@
 //! build the package, show the demo, run every check and measure.
 #![forbid(unsafe_code)]
 
+mod animation;
 mod bench;
 mod bench_against_vtk;
 mod bench_beside_vtk;
@@ -26,6 +27,7 @@ mod public_api;
 mod python;
 mod random;
 mod release;
+mod release_files;
 mod serve;
 mod shell;
 mod suite;
@@ -48,10 +50,13 @@ usage: cargo xtask COMMAND
   docs                           make the documentation's site in target/docs
   pages [--small]                make the demo and the documentation's site as one folder of static files, target/pages;
                                  with --small without the large volume
+  animation                      record the picture that README.md begins with, docs/flow-past-sphere.gif, in the demo's page
   test [STEP...]                 every check, or the named steps; `test --list` names them
   test --quick                   formatting, lints and native tests; not: documentation, the longest tests, real data,
                                  JavaScript, wasm, browsers
-  release [vX.Y.Z]               check that everything can be published, as this version; publishes nothing
+  archive                        pack the command for this machine, with its page, manual pages and completions, in target/release-files
+  release [vX.Y.Z]               check that everything can be published, as this version, and make target/release-files: archives
+                                 with checksums, recipes for conda and Homebrew; publishes nothing
   random [MINUTES]               the tests with random inputs for 30 minutes, each time with another TETRALOD_SEED
   planted [WORD...]              plant faults in a copy of the library, all or those with a word in their names or files: a
                                  test has to find each
@@ -90,12 +95,17 @@ fn run() -> Result<()> {
         "wheel" => python::wheel(rest),
         "docs" => docs::run(rest),
         "pages" => pages::run(rest),
+        "animation" => animation::run(rest),
         "test" => suite::run(rest),
         "bench" => bench::run(rest),
         "paper" => paper::run(rest),
         "planted" => planted::run(rest),
         "random" => random::run(rest),
         "release" => release::run(rest),
+        "archive" => {
+            package::ensure_built(package::Profile::Released)?;
+            release_files::archive()
+        }
         other => bail!("there is no command `{other}`\n{USAGE}"),
     }
 }

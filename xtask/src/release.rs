@@ -5,7 +5,7 @@ use std::fs;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::serve::Server;
-use crate::{package, shell};
+use crate::{package, release_files, shell};
 
 /// Checks the version and what would be uploaded; with a tag, such as `v0.1.0`, also that it names this version.
 pub fn run(args: &[String]) -> Result<()> {
@@ -20,6 +20,8 @@ pub fn run(args: &[String]) -> Result<()> {
     }
     package::build(&[])?;
     check_page()?;
+    release_files::archive()?;
+    release_files::recipes()?;
     // They need each other, which are not on crates.io yet: cargo takes them from here.
     let mut publish = shell::cargo(["publish", "--dry-run", "--locked"]);
     shell::run(publish.args(package::PUBLISHED.iter().flat_map(|name| ["--package", name])))?;
