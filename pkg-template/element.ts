@@ -155,6 +155,7 @@ export class TetralodViewerElement extends Base {
   /** Set by property: anything that a viewer opens. */
   #source: Source | undefined;
   #state: ViewerChanges = {};
+  #given: ViewerRefineOptions | undefined;
   #status: "empty" | "loading" | "ready" | "failed" = "empty";
   #error: Error | undefined;
   /** Counts what has been opened. */
@@ -181,7 +182,7 @@ export class TetralodViewerElement extends Base {
   connectedCallback() {
     // Set before the element was defined.
     const own = this as unknown as Record<string, unknown>;
-    for (const name of [...Object.values(ATTRIBUTES), "source", "state"]) {
+    for (const name of [...Object.values(ATTRIBUTES), "source", "state", "request"]) {
       if (!Object.hasOwn(own, name)) continue;
       const value = own[name];
       delete own[name];
@@ -243,6 +244,16 @@ export class TetralodViewerElement extends Base {
 
   set state(state: ViewerChanges) {
     this.#state = { ...state };
+    this.#soon();
+  }
+
+  /** Which mesh is drawn, as for `viewer.refine`, in place of what the attributes `error`, `field` and `max-tets` say; `null` without it. */
+  get request(): ViewerRefineOptions | null {
+    return this.#given ?? null;
+  }
+
+  set request(request: ViewerRefineOptions | null) {
+    this.#given = request ?? undefined;
     this.#soon();
   }
 
@@ -356,6 +367,7 @@ export class TetralodViewerElement extends Base {
 
   /** Which mesh is drawn: without `error`, one that is right within a pixel. */
   #request(): ViewerRefineOptions {
+    if (this.#given) return this.#given;
     const [error, field, most] = ["error", "field", "max-tets"].map((name) => this.getAttribute(name) ?? undefined);
     const isNumber = error !== undefined && error.trim() !== "" && Number.isFinite(Number(error));
     const need = error === undefined ? { view: { pixels: 1, outside: "10%" } } : { error: isNumber ? Number(error) : error };
@@ -501,6 +513,7 @@ export interface TetralodViewerJsx {
   "worker-url"?: string | undefined;
   "wasm-url"?: string | undefined;
   state?: { [K in keyof ViewerState]?: ViewerState[K] | null } | undefined;
+  request?: ViewerRefineOptions | null | undefined;
   onload?: ((event: TetralodViewerEventMap["load"]) => void) | undefined;
   onerror?: ((event: TetralodViewerEventMap["error"]) => void) | undefined;
   /** Everything else, whose types differ from library to library: `ref`, `key`, `className`, `style`, `children`, `aria-label`, … */

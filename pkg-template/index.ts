@@ -68,7 +68,7 @@ import type {
 import type { Answer, Args, NodeWorker, Remote } from "./rpc.js";
 import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
 import { type Absolute, absolute, displaced, fieldsOf } from "./stored.js";
-import { type RangesSource, type Source, abortable, isRepeatable, openSource, pump, rangesOf } from "./stream.js";
+import { type RangeReader, type RangesSource, type Source, abortable, isRepeatable, openSource, pump, rangesOf, transferOf } from "./stream.js";
 import type { SurfaceOptions } from "./surfaces.js";
 import { type AsideOptions, type AwaitOptions, type FieldOptions, type MeshTools, setCaller, withMeshTools } from "./tools.js";
 
@@ -99,6 +99,7 @@ export type {
   Need,
   NodeWorker,
   Progress,
+  RangeReader,
   ReadOptions,
   RefineOptions,
   RefineStats,
@@ -221,7 +222,7 @@ export interface MultiTessellationEventMap {
 const OPEN_OPTIONS = ["signal", "onProgress", ...PLACES];
 const NO_RETRY = "only a file that is fetched in parts can be continued: open it again";
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "arrays", "signal"];
-const NO_VIEW = "a stream is read only once; for views, open a URL, a Blob or bytes in memory";
+const NO_VIEW = "a stream is read only once; for views, open a URL, a Blob, bytes in memory or ranges";
 const NO_ZERO_COPY = "needs `worker: false`, and no `deltas`: no other thread has this memory";
 
 /** What answers the calls: a worker, or a session in the caller's thread. */
@@ -258,13 +259,16 @@ export class MultiTessellation extends withMeshTools<AsideOptions, MultiTessella
    * Opens a volume. Resolves as soon as its base mesh has arrived.
    *
    * A URL (text, `URL`, or a `Request` that gets) of `http` or `https` is fetched in parts, by byte ranges: only the
-   * blocks that the request needs, most important first. In pages a `File` or `Blob` is read so, too, by slices. If the
-   * server gives no ranges, with `whole`, and from all other sources, the rest arrives as a stream.
+   * blocks that the request needs, most important first. In pages a `File` or `Blob` is read so, too, by slices, and
+   * everywhere `{ name, size, read(start, end) }` by what `read` gives. If the server gives no ranges, with `whole`, and from all other sources, the rest arrives as a stream.
    *
    * @example
    * await MultiTessellation.open("https://example.org/combustor.mt");
    * @example
    * await MultiTessellation.open(fileInput.files[0]);
+   * @example
+   * const read = async (start, end) => new Uint8Array(await archive.bytes("combustor.mt", start, end));
+   * await MultiTessellation.open({ name: "combustor.mt", size, read });
    * @example
    * await MultiTessellation.open(await readFile("combustor.mt"), { worker: false });
    * @throws {TetralodError} when the source cannot be read or is not an MT file
@@ -527,10 +531,10 @@ export class MultiTessellation extends withMeshTools<AsideOptions, MultiTessella
   }
 
   /** A call that may wait for bytes: the end of the download ends the wait. */
-  #wait<Method extends keyof CoreMethods>(method: Method, args: Args<CoreMethods, Method>, waits = true): Answer<CoreMethods, Method> {
+  #wait<Method extends keyof CoreMethods>(method: Method, args: Args<CoreMethods, Method>, waits = true, transfer: Transferable[] = []): Answer<CoreMethods, Method> {
     // A signal may have ended the download before, which is not why this call fails.
     if (this.#closed) return Promise.reject(this.#closed);
-    const called = this.#core.call(method, args);
+    const called = this.#core.call(method, args, transfer);
     return waits ? abortable(called, this.#stop.signal) : called;
   }
 
@@ -573,7 +577,7 @@ export class MultiTessellation extends withMeshTools<AsideOptions, MultiTessella
 
   /** Whether the file comes in parts. */
   async #beginParts({ whole: _, ...fetching }: Reading, { url, ...along }: RangesSource) {
-    const opened = await this.#wait("openParts", [url, { ...fetching, ...along }]);
+    const opened = await this.#wait("openParts", [url, { ...fetching, ...along }], true, transferOf(along));
     if (!opened) return false;
     this.#info = opened.info;
     if (!this.#progress.ready) this.#tell(opened.progress);

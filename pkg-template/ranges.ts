@@ -3,8 +3,10 @@
  * this does it, and passes on the bytes that arrive. It does not interpret the bytes or decide which are needed.
  */
 
-import { type TetralodError, known, ofFile, reviveError } from "./errors.js";
+import { TetralodError, known, ofFile, reviveError } from "./errors.js";
 import type { Traffic } from "./results.js";
+import { Remote, portEndpoint } from "./rpc.js";
+import type { ReaderMethods, ReaderPort } from "./stream.js";
 import type { RangeLoader } from "./tetralod_core.js";
 
 /** The headers that the loader reads, in its order. */
@@ -49,9 +51,14 @@ export interface RangesOptions {
   timeoutMs?: number;
   /** Is read instead of a server. */
   blob?: Blob;
+  /** Is asked instead of a server. */
+  reader?: ReaderPort;
   /** Stands for the address in messages. */
   name?: string;
 }
+
+/** How long is waited for a reader of the page's own, in ms: it gives bytes or says why not. Timers cannot wait much longer. */
+const FOREVER = 2 ** 30;
 
 /** A `fetch` of one address. */
 export type Fetch = (url: string, init: RequestInit & { headers: Headers }) => Promise<Response>;
@@ -113,6 +120,7 @@ export class Ranges {
   #due = Infinity;
   #cached: Kept | undefined;
   #leave = () => {};
+  #release = () => {};
   #failed = false;
   #closed = false;
   #knowsServer = false;
@@ -121,7 +129,14 @@ export class Ranges {
 
   constructor(Loader: Loader, url: string, sink: RangesSink, options: RangesOptions = {}) {
     // What a file of the user does not give at once, it does not give later.
-    if (options.blob) options = { ...options, fetch: sliceOf(options.blob), retries: 0, cache: undefined };
+    const { blob, reader } = options;
+    if (blob) options = { ...options, fetch: answering(blob.size, (start, end) => blob.slice(start, end)), retries: 0, cache: undefined };
+    if (reader) {
+      const remote = new Remote<ReaderMethods>(portEndpoint(reader.port));
+      const read = async (start: number, end: number) => (await remote.call("read", [start, end])).bytes;
+      options = { timeoutMs: FOREVER, ...options, fetch: answering(reader.size, read), retries: 0, cache: undefined };
+      this.#release = () => remote.close(new Error("the file was closed"));
+    }
     const { maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs } = options;
     this.#loader = new Loader(maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs, Math.random());
     this.#url = this.#ledTo = new URL(url, globalThis.location?.href).href;
@@ -175,6 +190,7 @@ export class Ranges {
     this.#closed = true;
     clearTimeout(this.#timer);
     this.#leave();
+    this.#release();
     for (const controller of this.#open.values()) controller.abort();
     this.#open.clear();
     this.#loader.free();
@@ -205,10 +221,14 @@ export class Ranges {
     try {
       this.#obey();
     } catch (error) {
-      if (this.#failed) return;
-      this.#failed = true;
-      this.#sink.onError(ofFile(this.#options.name ?? this.#url, reviveError(error)));
+      this.#fail(reviveError(error));
     }
+  }
+
+  #fail(error: TetralodError) {
+    if (this.#failed || this.#closed) return;
+    this.#failed = true;
+    this.#sink.onError(ofFile(this.#options.name ?? this.#url, error));
   }
 
   #obey() {
@@ -290,6 +310,8 @@ export class Ranges {
       await this.#receive(id, asked, [start, end], controller.signal, tell);
     } catch (error) {
       const blocked = !controller.signal.aborted && (await this.#isBlocked(error, asked, controller.signal));
+      // A reader knows best what is wrong.
+      if (error instanceof TetralodError) this.#fail(error);
       const { message, cause } = known(error);
       const detail = String(cause?.message || cause?.code || message || error);
       tell((now) => this.#loader.failed(id, now, blocked, detail));
@@ -425,15 +447,15 @@ class SharedVersion implements Kept {
   }
 }
 
-/** Answers requests for ranges of `blob` as a server would, by slices of it. */
-function sliceOf(blob: Blob): Fetch {
+/** Answers requests for ranges of a file of this size as a server would, by what `read` gives. */
+function answering(size: number, read: (start: number, end: number) => BodyInit | Promise<BodyInit>): Fetch {
   return async (_, { headers }) => {
     const [, first, last] = /^bytes=(\d+)-(\d*)$/.exec(headers.get("range") ?? "") ?? ["", "0", ""];
     const start = Number(first);
-    const end = last === "" ? blob.size : Math.min(Number(last) + 1, blob.size);
-    if (start >= end) return new Response(null, { status: 416, headers: { "content-range": `bytes */${blob.size}` } });
-    const range = { "content-range": `bytes ${start}-${end - 1}/${blob.size}`, "content-length": String(end - start), etag: '"blob"' };
-    return new Response(blob.slice(start, end), { status: 206, headers: range });
+    const end = last === "" ? size : Math.min(Number(last) + 1, size);
+    if (start >= end) return new Response(null, { status: 416, headers: { "content-range": `bytes */${size}` } });
+    const range = { "content-range": `bytes ${start}-${end - 1}/${size}`, "content-length": String(end - start), etag: '"file"' };
+    return new Response(await read(start, end), { status: 206, headers: range });
   };
 }
 

@@ -6,6 +6,7 @@
  */
 
 import { TetralodError, known, ofFile } from "./errors.js";
+import { portEndpoint, serve } from "./rpc.js";
 
 /** Everything that an MT can be read from. Bytes in memory are copied, not taken away. */
 export type Source =
@@ -17,7 +18,21 @@ export type Source =
   | ArrayBuffer
   | ArrayBufferView
   | ReadableStream<Uint8Array>
-  | AsyncIterable<Uint8Array>;
+  | AsyncIterable<Uint8Array>
+  | RangeReader;
+
+/** A file of which the page's own code reads byte ranges: out of an archive, or over a connection of its own. */
+export interface RangeReader {
+  /** What to call the file in messages. */
+  name: string;
+  /** In bytes. */
+  size: number;
+  /**
+   * The bytes from `start` to just before `end`, which is at most `size`; several calls may wait at a time. They are copied, not taken
+   * away. What it throws ends the reading, and is the error of whoever waits; with a `code` of `ErrorCode` it keeps that.
+   */
+  read(start: number, end: number): Uint8Array | Promise<Uint8Array>;
+}
 
 /** Bytes in memory are handed on in pieces of this size, so that progress shows and abort works. */
 const PIECE = 1 << 20;
@@ -55,6 +70,7 @@ export async function openSource(source: Source, signal?: AbortSignal, { headers
   if (url !== undefined) return openResponse(await request(source as string | URL | Request, url, { signal, headers, credentials }), url);
   if (isInstance(source, "Response")) return openResponse(source, source.url || "response");
   if (isInstance(source, "Blob")) return open(source.name || "blob", source.size, source.stream());
+  if (isReader(source)) return { name: source.name, total: source.size, chunks: piecesOf(source) };
   const bytes = bytesOf(source);
   if (bytes) return { name: "bytes", total: bytes.byteLength, chunks: pieces(bytes) };
   return open("stream", undefined, source);
@@ -145,7 +161,7 @@ function open(name: string, total: number | undefined, source: unknown): OpenSou
   return { name, total, chunks: named(iterator, name) };
 }
 
-const KINDS = "give a URL, Request, Response, Blob, ArrayBuffer, Uint8Array, ReadableStream or async iterable of Uint8Array";
+const KINDS = "give a URL, Request, Response, Blob, ArrayBuffer, Uint8Array, ReadableStream, async iterable of Uint8Array, or { name, size, read(start, end) }";
 
 const NO_PATH = 'a path is no URL; in Node, give pathToFileURL(path) of "node:url"';
 
@@ -201,6 +217,24 @@ async function* pieces(bytes: Uint8Array): AsyncGenerator<Bytes, undefined> {
   for (let at = 0; at < bytes.byteLength; at += PIECE) yield bytes.slice(at, at + PIECE);
 }
 
+async function* piecesOf(source: RangeReader): AsyncGenerator<Bytes, undefined> {
+  for (let at = 0; at < source.size; at += PIECE) yield readOf(source, at, Math.min(at + PIECE, source.size));
+}
+
+/** The bytes of a range, checked. */
+async function readOf(source: RangeReader, start: number, end: number): Promise<Bytes> {
+  let bytes: Uint8Array | undefined;
+  try {
+    bytes = bytesOf(await source.read(start, end));
+  } catch (error) {
+    const { code, message } = known(error);
+    if (typeof code === "string") throw error;
+    throw new TetralodError("network", message ?? String(error), { cause: error });
+  }
+  if (bytes?.byteLength === end - start) return bytes.slice();
+  throw new TetralodError("bad-source", `\`read(${start}, ${end})\` gave ${bytes ? `${bytes.byteLength} bytes` : "no bytes"}`);
+}
+
 function bytesOf(value: unknown): Uint8Array | undefined {
   if (value instanceof ArrayBuffer) return new Uint8Array(value);
   if (!ArrayBuffer.isView(value)) return undefined;
@@ -208,14 +242,37 @@ function bytesOf(value: unknown): Uint8Array | undefined {
   return new Uint8Array(value.buffer, value.byteOffset, value.byteLength);
 }
 
-/** What `Ranges` needs to fetch a file in parts: its address, and what goes along; or a file of the user, and its name. */
+/** What `Ranges` needs to fetch a file in parts: its address, and what goes along; or a file of the user or a reader, and its name. */
 export interface RangesSource {
   url: string;
   headers?: [string, string][];
   credentials?: RequestCredentials;
   blob?: Blob;
+  reader?: ReaderPort;
   name?: string;
 }
+
+/** A reader in another thread, which is asked through a port. */
+export interface ReaderPort {
+  size: number;
+  port: MessagePort;
+}
+
+/** What is answered there. */
+export type ReaderMethods = { read(start: number, end: number): Promise<{ bytes: Bytes }> };
+
+/** Answers for `source` until the other end closes. */
+function portOf(source: RangeReader): MessagePort {
+  const { port1, port2 } = new MessageChannel();
+  const endpoint = portEndpoint(port1);
+  const read = async (start: number, end: number) => ({ bytes: await readOf(source, start, end) });
+  serve(endpoint, { read, free: () => port1.close() }, ["read"]);
+  endpoint.hold?.(false);
+  return port2;
+}
+
+/** What goes to a worker with such a source. */
+export const transferOf = ({ reader }: Partial<RangesSource>) => (reader ? [reader.port] : []);
 
 /** The same of `source`, if that is a file on a server or of the user. */
 export function rangesOf(source: Source, { headers, credentials }: Along = {}): RangesSource | undefined {
@@ -223,6 +280,10 @@ export function rangesOf(source: Source, { headers, credentials }: Along = {}): 
   if (isInstance(source, "Blob") && source.size > 0 && !nodeModule("node:worker_threads")) {
     const name = source.name || "blob";
     return { url: `blob:${encodeURIComponent(name)}`, blob: source, name };
+  }
+  if (isReader(source)) {
+    const { name, size } = source;
+    return { url: `reader:${encodeURIComponent(name)}`, reader: { size, port: portOf(source) }, name };
   }
   const given = urlOf(source);
   const url = given === undefined ? "" : absolute(given);
@@ -237,7 +298,7 @@ export function rangesOf(source: Source, { headers, credentials }: Along = {}): 
 /** Whether `source` can be read again. */
 export function isRepeatable(source: Source): boolean {
   if (isInstance(source, "Request")) return source.method === "GET";
-  return urlOf(source) !== undefined || isInstance(source, "Blob") || source instanceof ArrayBuffer || ArrayBuffer.isView(source);
+  return urlOf(source) !== undefined || isReader(source) || isInstance(source, "Blob") || source instanceof ArrayBuffer || ArrayBuffer.isView(source);
 }
 
 /** `url` as it means the same in a worker; as it is where it means nothing. */
@@ -253,6 +314,12 @@ function urlOf(source: Source): string | undefined {
   if (typeof source === "string") return source;
   if (source instanceof URL) return source.href;
   return isInstance(source, "Request") ? source.url : undefined;
+}
+
+/** Streams of Node have `read`, too, but no size. */
+function isReader(source: Source): source is RangeReader {
+  const { read, size } = Object(source);
+  return typeof read === "function" && Number.isSafeInteger(size);
 }
 
 /** Classes that a runtime may lack. */

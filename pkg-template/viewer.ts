@@ -24,7 +24,7 @@ import type { Remote } from "./rpc.js";
 import type { CameraState, Legend, Misfit, Overlay, Reading, SceneState, ViewerChanges, ViewerState } from "./scene.js";
 import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
 import { absolute, displaced } from "./stored.js";
-import { type OpenSource, type RangesSource, type Source, abortable, openSource, pump, rangesOf } from "./stream.js";
+import { type OpenSource, type RangesSource, type Source, abortable, openSource, pump, rangesOf, transferOf } from "./stream.js";
 import { type AwaitOptions, type FieldOptions, setCaller, withMeshTools } from "./tools.js";
 import type { ViewerMethods } from "./viewer-worker.js";
 
@@ -500,7 +500,7 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   ): Promise<OpenedVolume | undefined> {
     const { promise, resolve } = deferred<void>();
     signal.addEventListener("abort", () => this.#remote.call("halt", []).catch(() => {}), { once: true });
-    const opened = await abortable(this.#remote.call("openParts", [url, { ...fetching, ...along }]), signal);
+    const opened = await abortable(this.#remote.call("openParts", [url, { ...fetching, ...along }], transferOf(along)), signal);
     if (!opened?.info) return undefined;
     const { info, scene = {}, dropped = [], progress } = opened;
     [this.#info, this.#scene] = [info, scene];

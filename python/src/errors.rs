@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use tetralod::Coded;
 use tetralod::session::ClientError;
+use tetralod::stream::StreamError;
 use tetralod_build::{BuildError, Remedy};
 use tetralod_io::TimeStepsError;
 
@@ -38,6 +39,11 @@ pub fn client(error: &ClientError) -> Failure {
         _ => "internal",
     };
     Failure::new(code, error.to_string())
+}
+
+/// The code of why bytes do not come.
+pub fn stream(error: &StreamError) -> Failure {
+    Failure::new(error.code(), error.to_string())
 }
 
 /// The code of what is wrong with time steps.

@@ -26,6 +26,8 @@ mod native {
     use super::mt::Mt;
     #[pymodule_export]
     use super::run;
+    #[pymodule_export]
+    use super::source::Ranges;
 }
 
 /// Runs the command `tetralod` and gives its exit code. `again` is what runs it in another process: a program, and its first arguments.

@@ -1,8 +1,9 @@
 //! Where the bytes of MT files come from: disks, servers, memory of Python.
 
-use crate::errors::Failure;
+use crate::errors::{Failure, stream};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyBytes;
 use std::fs::File;
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -15,6 +16,9 @@ use tetralod::stream::{
 /// How long is waited at a time before Python is asked whether to go on.
 const SHORT: Duration = Duration::from_millis(50);
 
+/// How long is waited for a range at a time.
+const PATIENCE: Duration = Duration::from_millis(200);
+
 /// The error of Python's that has ended a wait.
 pub type Interrupt = Arc<Mutex<Option<PyErr>>>;
 
@@ -23,6 +27,55 @@ pub type Interrupt = Arc<Mutex<Option<PyErr>>>;
 pub enum Given {
     Bytes(PyBackedBytes),
     Path(PathBuf),
+}
+
+/// Ranges of an MT file, for who reads the file by itself.
+#[pyclass(frozen)]
+pub struct Ranges {
+    source: Mutex<Source>,
+    interrupt: Interrupt,
+    name: String,
+}
+
+#[pymethods]
+impl Ranges {
+    #[new]
+    fn open(py: Python<'_>, given: Given, name: String, network: Network) -> PyResult<Self> {
+        py.detach(|| {
+            let interrupt = Interrupt::default();
+            let source = Source::of(given, network, &interrupt).map_err(|error| error.of(&name))?;
+            Ok(Self { source: Mutex::new(source), interrupt, name })
+        })
+    }
+
+    /// The bytes from `start` to just before `end`, fewer where the file ends.
+    fn read<'py>(&self, py: Python<'py>, start: u64, end: u64) -> PyResult<Bound<'py, PyBytes>> {
+        let range = start..end;
+        if range.is_empty() {
+            return Ok(PyBytes::new(py, &[]));
+        }
+        let read = || {
+            let mut source = self.source.lock().unwrap_or_else(PoisonError::into_inner);
+            source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
+            loop {
+                // What was asked for before an error may come, too.
+                if let Some((arrived, bytes)) = source.next(PATIENCE)?
+                    && arrived == range
+                {
+                    return Ok(bytes);
+                }
+            }
+        };
+        let bytes = py.detach(read).map_err(|error: StreamError| {
+            interrupted(&self.interrupt).unwrap_or_else(|| stream(&error).of(&self.name).into())
+        })?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// The size of the file, once anything of it has been read.
+    fn size(&self) -> Option<u64> {
+        self.source.lock().unwrap_or_else(PoisonError::into_inner).total()
+    }
 }
 
 /// How a server is asked.

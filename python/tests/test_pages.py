@@ -29,7 +29,7 @@ def test_the_docstrings_have_examples():
     finder = doctest.DocTestFinder(exclude_empty=True)
     tests = [test for name in MODULES if name != "tetralod.__main__" for test in finder.find(importlib.import_module(name))]
     shown = {test.name.split(".")[-1] for test in tests if test.examples}
-    assert {"build", "refine", "isosurface", "slice", "boundary", "probe", "field_stats", "TetralodError"} <= shown
+    assert {"build", "refine", "isosurface", "slice", "boundary", "probe", "field_stats", "show", "TetralodError"} <= shown
 
 
 @pytest.mark.parametrize("page", ["README.md", "python/README.md", "docs/howto/python.md"])

@@ -2,7 +2,7 @@
 
 ``tetralod.build`` makes a Multi-Tessellation (MT) of a mesh: of arrays, of a PyVista or meshio object, or of a file.
 ``tetralod.open`` opens an MT file here or on a server. ``Mt.refine`` takes the mesh out of it that is needed, as NumPy
-arrays: accurate here, coarse there, around an isovalue, at most so many tetrahedra.
+arrays: accurate here, coarse there, around an isovalue, at most so many tetrahedra. ``tetralod.show`` draws it in a notebook.
 
 >>> import numpy as np, tetralod
 >>> axis = np.linspace(0, 1, 9)
@@ -20,6 +20,7 @@ from ._errors import TetralodError
 from ._info import Field, Info, Region, Regions, VectorPart
 from ._mesh import FieldStats, Lines, Mesh, RefineStats, Surface
 from ._mt import Mt, open
+from ._show import show
 
 __all__ = [
     "Field",
@@ -36,4 +37,5 @@ __all__ = [
     "VectorPart",
     "build",
     "open",
+    "show",
 ]

@@ -56,7 +56,7 @@ def open(
     }
     room = None if memory is None else _options.whole("memory", memory, 0, 2**63 - 1)
     native = _native.Mt(data, name, _options.names("fields", fields), room, network)
-    return Mt(native, name, data if isinstance(data, bytes) else None, None)
+    return Mt(native, name, (data, name, network))
 
 
 class Mt:
@@ -70,11 +70,11 @@ class Mt:
     report: dict[str, Any] | None
     """Of an MT that was built here: what was done, in the words of ``tetralod build --json``."""
 
-    def __init__(self, native: _native.Mt, name: str, data: bytes | None, report: dict[str, Any] | None) -> None:
+    def __init__(self, native: _native.Mt, name: str, given: tuple[Any, str, dict[str, Any]]) -> None:
         self._native: _native.Mt | None = native
         self._name = name
-        self._data = data
-        self.report = report
+        self._given: tuple[Any, str, dict[str, Any]] | None = given
+        self.report = None
         self.info = info_of(native.info())
 
     def __repr__(self) -> str:
@@ -90,7 +90,7 @@ class Mt:
 
     def close(self) -> None:
         """Closes the file and frees its memory. Meshes that were taken out of it stay."""
-        self._native = self._data = None
+        self._native = self._given = None
 
     def refine(
         self,
@@ -188,16 +188,22 @@ class Mt:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file of an MT that was built here, or opened from bytes. What was there before stays if that fails."""
-        self._open()
-        if self._data is None:
+        data = self._source()[0]
+        if not isinstance(data, bytes):
             raise TetralodError("bad-source", f"{self._name} is a file already: copy it")
         target = Path(path)
         partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
         try:
-            partial.write_bytes(self._data)
+            partial.write_bytes(data)
             os.replace(partial, target)
         finally:
             partial.unlink(missing_ok=True)
+
+    def _source(self) -> tuple[Any, str, dict[str, Any]]:
+        """What it was opened from, as the native module takes it: the file, its name, and how a server is asked."""
+        self._open()
+        assert self._given is not None
+        return self._given
 
     def _open(self) -> _native.Mt:
         if self._native is None:

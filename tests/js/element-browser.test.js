@@ -185,6 +185,29 @@ test("the poster is shown until the first picture, and stays without WebGPU, wit
   await without.page.close();
 });
 
+test("a reader is asked for ranges, and `request` goes before the attributes", async () => {
+  const { page, complaints } = await opened(`<tetralod-viewer error="5%"></tetralod-viewer>`);
+  const asked = await page.evaluate(async () => {
+    const element = document.querySelector("tetralod-viewer");
+    const bytes = new Uint8Array(await (await fetch("model.mt")).arrayBuffer());
+    const asked = [];
+    const read = (start, end) => (asked.push(end), bytes.subarray(start, end));
+    Object.assign(element, { request: { error: 0, maxTets: 900 }, source: { name: "own.mt", size: bytes.length, read } });
+    await new Promise((resolve) => element.addEventListener("load", resolve));
+    return asked;
+  });
+  assert.ok(asked.length > 0 && asked.every((end) => end <= file.length));
+  await reach(page, "ready");
+  const rested = async () => (await page.evaluate(() => document.querySelector("tetralod-viewer").viewer.settled()), count());
+  const count = () => page.evaluate(async () => (await document.querySelector("tetralod-viewer").viewer.mesh()).tets.length / 4);
+  const few = await rested();
+  assert.ok(few > 100 && few <= 900, `${few} tetrahedra`);
+  await page.evaluate(() => (document.querySelector("tetralod-viewer").request = null));
+  await page.waitForFunction((few) => document.querySelector("tetralod-viewer").viewer.mesh().then(({ tets }) => tets.length > 4 * few), few);
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
 test("errors are events, name what is wrong, and go when it is right again", async () => {
   const complains = /404/;
   const { page, complaints } = await opened(`<tetralod-viewer src="none.mt"></tetralod-viewer>`, { complains });

@@ -408,6 +408,41 @@ for (const [kind, worker] of Object.keys(blocks).flatMap(
       streamed.free();
     });
 
+    test("a reader of the caller's own is asked for the same ranges, and says itself what is wrong", async () => {
+      const copy = bytes.slice();
+      const [request] = REQUESTS;
+      const read = [];
+      const reader = {
+        name: "own.mt",
+        size: bytes.length,
+        read(start, end) {
+          read.push([start, end]);
+          return bytes.subarray(start, end);
+        },
+      };
+      const opened = (source) => MultiTessellation.open(source, { worker, gap: 256 });
+      const [mt, other] = [await opened(reader), await opened(reader)];
+      await mt.refine(request);
+      assert.equal(await mt.hash(), hashes[0]);
+      assert.ok(mt.progress.blocks.here < mt.progress.blocks.all, "what is not needed is not read");
+      assert.ok(read.every(([start, end]) => 0 <= start && start < end && end <= bytes.length));
+      assert.deepEqual(bytes, copy, "the caller keeps the bytes");
+      // As a stream, and as a second mesh of the same file.
+      const view = await mt.view();
+      await view.refine(request);
+      assert.equal(await view.hash(), await mt.hash());
+      const front = await MultiTessellation.open(reader, { worker, whole: true });
+      await front.complete;
+      assert.equal(front.progress.bytes, bytes.length);
+      // What it throws is the error of whoever waits, with its code; then it is asked again.
+      reader.read = () => Promise.reject(Object.assign(new Error("it was replaced"), { code: "changed" }));
+      await rejects(other.refine({ error: 0 }), "changed", /^own\.mt: it was replaced$/);
+      await rejects(opened({ ...reader, read: () => Promise.reject(new Error("no way")) }), "network", /^own\.mt: no way$/);
+      await rejects(opened({ ...reader, read: () => new Uint8Array(3) }), "bad-source", /^own\.mt: `read\(0, \d+\)` gave 3 bytes$/);
+      await rejects(opened({ ...reader, read: () => undefined }), "bad-source", /gave no bytes$/);
+      for (const one of [mt, other, front]) one.free();
+    });
+
     test("headers go along, and URLs and requests do as well as text", async () => {
       for (const source of [new URL(base), new Request(base, { headers: { "x-key": "open" } })]) {
         asked = [];

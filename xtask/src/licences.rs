@@ -38,14 +38,14 @@ copyright The Rust Project Contributors, under the MIT licence (https://www.rust
 /// A crate: its name with its version, and the licence in its manifest.
 type Crates = BTreeMap<String, String>;
 
-/// Writes the licences of all crates in the modules that are made of these packages into `folder`; for this machine without a `target`.
+/// Writes the licences of all crates in the modules that are made of these packages, each for a target, into `folder`; for this machine
+/// without one.
 pub fn write<'a>(
     folder: &Path,
-    target: Option<&str>,
-    packages: impl IntoIterator<Item = &'a str>,
+    packages: impl IntoIterator<Item = (&'a str, Option<&'a str>)>,
 ) -> Result<()> {
     let mut crates = Crates::new();
-    for package in packages {
+    for (package, target) in packages {
         crates.extend(compiled(package, target)?);
     }
     for (name, licence) in &crates {

@@ -18,14 +18,14 @@ use crate::{licences, shell};
 /// Where the package is put together.
 pub const PKG: &str = "pkg";
 
-struct Module {
+pub struct Module {
     /// Of the module and its script.
     name: &'static str,
     /// The crate that it is made of.
-    package: &'static str,
+    pub package: &'static str,
 }
 
-const VIEWER: Module = Module { name: "tetralod_viewer", package: "tetralod-web-viewer" };
+pub const VIEWER: Module = Module { name: "tetralod_viewer", package: "tetralod-web-viewer" };
 
 const MODULES: [Module; 3] = [
     Module { name: "tetralod_core", package: "tetralod-web-core" },
@@ -231,7 +231,7 @@ fn assemble(staging: &Path) -> Result<()> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(licence, staging.join(licence)).context(licence)?;
     }
-    licences::write(staging, Some(shell::WASM), MODULES.iter().map(|module| module.package))?;
+    licences::write(staging, MODULES.iter().map(|module| (module.package, Some(shell::WASM))))?;
     version()?;
     shell::run(shell::command("node", ["xtask/js/inline.mjs"]).arg(staging))?;
     let files = files_of(staging)?;

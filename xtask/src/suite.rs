@@ -54,8 +54,8 @@ const STEPS: [Step; 16] = [
     ),
     step(
         "python",
-        "the Python package: its types, and a wheel in environments of its own",
-        &["compile"],
+        "the Python package: its types, a wheel in environments of its own, and its widget in headless Chromium",
+        &["compile", "package"],
         python::test,
     ),
     step("workflows", "building in parts, with a process killed", &["compile"], workflows::test),

@@ -13,6 +13,7 @@ import {
   type OpenOptions,
   type RefineOptions,
   type RefineResult,
+  type RangeReader,
   type Source,
   type Where,
 } from "tetralod";
@@ -83,6 +84,21 @@ const failed: ErrorCode | undefined = await mt.refine({ error: -1 }).then(
 );
 mt.free();
 
+// A reader that knows nothing but its size: it is asked for a range, and what it throws comes out.
+const ranges: [number, number][] = [];
+const reader: RangeReader = {
+  name: "own.mt",
+  size: 1000,
+  read(start, end) {
+    ranges.push([start, end]);
+    throw new Error("there is no way to it");
+  },
+};
+const unread: string = await MultiTessellation.open(reader).then(
+  () => "",
+  (error: unknown) => (error instanceof TetralodError ? `${error.code} ${error.message}` : ""),
+);
+
 // They throw where an option does not do what its type says; the compiler asks for an example of each.
 await checkOptions(source);
 await checkBuild();
@@ -104,6 +120,8 @@ const good =
   plain.tets === copy.tets &&
   why.every((words) => words === "Error: enough") &&
   failed === "bad-option" &&
+  ranges[0]?.join() === "0,1000" &&
+  unread === "network own.mt: there is no way to it" &&
   (await refusal()) === "no-webgpu";
 console.log(`${info.vertices} vertices, ${mesh.stats.tetrahedra} tetrahedra extracted, hash ${hash}`);
 if (!good) throw new Error("the installed package does not do what its types say");

@@ -24,6 +24,8 @@ export async function misuse(mt: MultiTessellation): Promise<void> {
   await mt.isosurface("high");
   // @ts-expect-error a number is no source
   await MultiTessellation.open(7);
+  // @ts-expect-error a reader has a size
+  await MultiTessellation.open({ name: "own.mt", read: () => new Uint8Array() });
   // @ts-expect-error what is known of a volume cannot be changed
   mt.info = await mt.info;
 }
