@@ -27,7 +27,7 @@ pub struct Module {
 
 pub const VIEWER: Module = Module { name: "tetralod_viewer", package: "tetralod-web-viewer" };
 
-const MODULES: [Module; 3] = [
+pub const MODULES: [Module; 3] = [
     Module { name: "tetralod_core", package: "tetralod-web-core" },
     VIEWER,
     Module { name: "tetralod_build", package: "tetralod-web-build" },

@@ -33,7 +33,9 @@ pub fn archive() -> Result<()> {
     for file in ["LICENSE-APACHE", "LICENSE-MIT"] {
         fs::copy(file, folder.join(file))?;
     }
-    licences::write(&folder, None, ["tetralod-cli"])?;
+    // The page inside has the modules of the package.
+    let modules = package::MODULES.iter().map(|module| (module.package, Some(shell::WASM)));
+    licences::write(&folder, modules.chain([("tetralod-cli", None)]))?;
     shell::run(shell::command(&program, ["completions", "--man"]).arg(&pages))?;
     for (shell, file) in [
         ("bash", "tetralod.bash"),
