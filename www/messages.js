@@ -15,6 +15,7 @@ const TITLES = {
   truncated: "The file is incomplete",
   "too-large": "The mesh is too large for this GPU",
   "bad-option": "This cannot be shown",
+  "needs-webgpu": "Volumes are not drawn without WebGPU",
 };
 
 /** Errors that may be gone when the same is tried again. */
@@ -24,6 +25,8 @@ const LASTING = /HTTP 4(?!08|25|29)\d\d/;
 
 /** Shows what went wrong. What has arrived stays usable. @param {any} error */
 export function fail(error) {
+  // All but the volume is there.
+  if (error.code === "needs-webgpu") return say(TITLES[error.code], error);
   demo.error = { code: error.code, message: error.message };
   demo.state = "failed";
   $("loading").classList.add("done");

@@ -181,9 +181,12 @@ test("the page draws every dataset of the demo, of every kind of MT", async () =
   }
 });
 
-test("a browser without WebGPU gets a message, not a blank page", async () => {
+test("a browser without WebGPU and WebGL gets a message, not a blank page", async () => {
   const page = await open("data/sphere-flow.mt", async (page) => {
-    await page.addInitScript(() => Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined }));
+    await page.addInitScript(() => {
+      Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
+      OffscreenCanvas.prototype.getContext = () => null;
+    });
     // Whoever made the volumes had a GPU.
     await page.route("**/data/volumes.json", async (route) => {
       const list = await (await route.fetch()).json();

@@ -158,7 +158,7 @@ test("pointer, wheel and keys move it; scrolling past it does not", async () => 
   await page.close();
 });
 
-test("the poster is shown until the first picture, and stays without WebGPU, with the reason", async () => {
+test("the poster is shown until the first picture, and stays without WebGPU and WebGL, with the reason", async () => {
   const isShown = (page) => page.locator("svg").isVisible();
   const { page } = await opened(`<tetralod-viewer>${POSTER}</tetralod-viewer>`);
   assert.equal(await isShown(page), true);
@@ -174,7 +174,10 @@ test("the poster is shown until the first picture, and stays without WebGPU, wit
   assert.deepEqual(await page.evaluate(() => window.tetralodDemo.events), ["load"]);
   await page.close();
 
-  const prepare = () => Object.defineProperty(navigator, "gpu", { value: undefined });
+  const prepare = () => {
+    Object.defineProperty(navigator, "gpu", { value: undefined });
+    OffscreenCanvas.prototype.getContext = () => null;
+  };
   const without = await opened(`<tetralod-viewer src="model.mt">${POSTER}</tetralod-viewer>`, { prepare });
   await reach(without.page, "failed");
   assert.equal(await isShown(without.page), true);

@@ -390,12 +390,12 @@ fn e2e() -> Result<()> {
         let test = |name: &str, variable: &str, path: &Path| {
             shell::run(fixture_env(node_test(&format!("{name}-browser.test.js")).env(variable, path)))
         };
-        for name in ["core", "ranges", "streams", "parts", "viewer", "places", "element", "build"] {
+        for name in ["core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "build"] {
             test(name, "CHROMIUM", &browser.chromium)?;
         }
         let firefox = browser::firefox()?;
-        println!("what needs no GPU, in Firefox");
-        ["core", "ranges"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
+        println!("what needs no WebGPU, in Firefox");
+        ["core", "ranges", "webgl"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
     })?;
     for name in ["state.test.js", "e2e.test.js", "page.test.js", "drop.test.js"] {
         let mut command = node_test(name);

@@ -1,0 +1,145 @@
+// WebGL 2, which draws where there is no WebGPU: each picture beside that of WebGPU, in numbers and in `target/e2e/webgl/`. In a browser
+// without WebGPU what WebGL draws is looked at alone.
+import assert from "node:assert/strict";
+import { mkdir, readFile, writeFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { launch, servePackage } from "./browser.js";
+import { assertDrawn, differing, distance, study } from "./study.js";
+
+const folder = process.env.TETRALOD_FIXTURE;
+assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test e2e`");
+const pictures = new URL("../../target/e2e/webgl/", import.meta.url);
+const isFirefox = Boolean(process.env.FIREFOX);
+
+const PAGE = `<!doctype html><style>canvas { width: 360px; height: 240px }</style><canvas id="webgpu"></canvas><canvas id="webgl"></canvas>
+  <script type="importmap">{ "imports": { "tetralod": "/pkg/index.js", "tetralod/viewer": "/pkg/viewer.js" } }</script>`;
+
+let browser;
+let server;
+
+before(async () => {
+  await mkdir(pictures, { recursive: true });
+  server = await servePackage(async ({ url }, response) => {
+    const [, name] = /^\/([\w-]+)\.mt$/.exec(url) ?? [];
+    if (name) response.end(await readFile(`${folder}/${name}.mt`));
+    else response.setHeader("content-type", "text/html").end(PAGE);
+  });
+  browser = await launch();
+});
+
+after(async () => {
+  await browser?.close();
+  server?.close();
+});
+
+/** A page with a viewer of the file for each renderer, at the same mesh. */
+async function opened(file, renderers = isFirefox ? ["webgl"] : ["webgpu", "webgl"]) {
+  const page = await browser.newPage();
+  await page.goto(server.address);
+  await page.evaluate(
+    async ([file, renderers]) => {
+      const { Viewer } = await import("tetralod/viewer");
+      const viewers = [];
+      const errors = [];
+      for (const renderer of renderers) {
+        const viewer = await Viewer.create(/** @type {HTMLCanvasElement} */ (document.getElementById(renderer)), { renderer, frameTime: Infinity });
+        viewer.addEventListener("error", (event) => errors.push(`${renderer}: ${event.detail.code}: ${event.detail.message}`));
+        await viewer.open(file, { state: { isosurfaces: [], shade: 0 }, request: { error: "1%" } });
+        viewers.push(viewer);
+      }
+      Object.assign(window, { viewers, errors });
+    },
+    /** @type {const} */ ([file, renderers]),
+  );
+  return page;
+}
+
+/** What each viewer draws of a scene. */
+async function drawn(page, name, scene) {
+  const seen = [];
+  const pngs = await page.evaluate(async (scene) => {
+    const { viewers, errors } = /** @type {any} */ (window);
+    errors.length = 0;
+    const blank = { isosurfaces: [], slices: [], boundary: null, cells: null, streamlines: null, arrows: null, deform: null, clips: [] };
+    const rest = { clipBox: null, colours: {}, background: null, outline: true, regions: null, threshold: null, region: null, volume: null };
+    const all = [];
+    for (const viewer of viewers) {
+      await viewer.set({ ...blank, ...rest, ...scene });
+      await viewer.settled();
+      const bytes = new Uint8Array(await (await viewer.screenshot({ samples: 4 })).arrayBuffer());
+      all.push({ renderer: viewer.renderer, bytes: btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join("")) });
+    }
+    return all;
+  }, scene);
+  for (const { renderer, bytes } of pngs) {
+    const png = Buffer.from(bytes, "base64");
+    await writeFile(new URL(`${name}-${renderer}.png`, pictures), png);
+    seen.push(await study(page, png));
+  }
+  return seen;
+}
+
+/** Both renderers draw the same: the mean over all channels, of 255, and the share of pixels that differ by more than a little. */
+function assertAlike([one, other], name) {
+  assertDrawn(one, name);
+  if (!other) return;
+  const apart = distance(one, other);
+  const channels = (pixel) => [0, 8, 16].map((shift) => (pixel >> shift) & 255);
+  const far = one.pixels.filter((pixel, i) => channels(pixel).some((value, c) => Math.abs(value - channels(other.pixels[i])[c]) > 24)).length;
+  console.log(`${name}: ${apart.toFixed(3)} of 255 apart, ${far} of ${one.pixels.length} far`);
+  assert.ok(apart < 0.8 && far <= 0.01 * one.pixels.length, `${name}: ${apart.toFixed(2)} of 255 apart, ${far} of ${one.pixels.length} pixels far`);
+}
+
+const cut = { normal: [0, 0, 1], offset: 3.3 };
+const FLOW = { fields: ["velocity_x", "velocity_y", "velocity_z"] };
+const SEEDS = [1, 2, 3, 4, 5].flatMap((x) => [1, 3, 5].map((y) => [x, y, 3]));
+
+/** Each mode, and the kinds of scenes that code of their own draws. */
+const SCENES = {
+  isosurface: { isosurfaces: [{ value: -1 }] },
+  "isosurface-by-value": { isosurfaces: [{ value: -1, field: "velocity_x" }], colours: { map: "turbo", bands: 8 } },
+  slice: { slices: [{ ...cut, edges: true }] },
+  boundary: { boundary: {}, colours: { map: "magma" } },
+  "boundary-clipped": { boundary: {}, clips: [{ normal: [0, -1, 0.2], offset: -2 }] },
+  "clip-box": { boundary: { edges: true }, clipBox: [1, 0, 0, 5, 6, 4] },
+  cells: { cells: {} },
+  "cells-cut": { cells: { cut, colourBy: "size" } },
+  "cells-clipped": { cells: {}, clips: [cut] },
+  "cells-shrunk": { cells: { shrink: 0.4, cut } },
+  wire: { cells: { shape: "wire", cut } },
+  points: { cells: { shape: "points" } },
+  streamlines: { streamlines: { ...FLOW, seeds: SEEDS } },
+  arrows: { arrows: FLOW },
+  deformed: { boundary: { edges: true }, deform: { field: "velocity", undeformed: true } },
+  "deformed-isosurface": { isosurfaces: [{ value: -1 }], deform: { field: "velocity" } },
+  "deformed-cells": { cells: {}, deform: { field: "velocity" } },
+  threshold: { boundary: {}, threshold: { range: [-1.2, 0], cut: true } },
+  "region-and-light-background": { slices: [cut], region: [1, 1, 1, 4, 5, 5], background: "light" },
+  translucent: { isosurfaces: [-1.6, -1.2, -0.8, -0.4].map((value) => ({ value, opacity: 0.4 })), boundary: { opacity: 0.2 } },
+  "translucent-among-opaque": {
+    isosurfaces: [{ value: -1 }],
+    slices: [{ ...cut, opacity: 0.5 }],
+    boundary: { opacity: 0.15 },
+    streamlines: { ...FLOW, seeds: SEEDS },
+  },
+};
+
+test("WebGL draws each mode as WebGPU does", async () => {
+  const page = await opened("/data/abc-flow.mt");
+  const failed = [];
+  let before;
+  for (const [name, scene] of Object.entries(SCENES)) {
+    const seen = await drawn(page, name, scene);
+    const errors = await page.evaluate(() => /** @type {any} */ (window).errors);
+    try {
+      assert.deepEqual(errors, []);
+      assertAlike(seen, name);
+      if (before) assert.ok(differing(before, seen[0]) > 0.005, `${name} is another picture than the one before`);
+    } catch (error) {
+      failed.push(`${name}: ${error.message}`);
+    }
+    before = seen[0];
+  }
+  assert.deepEqual(failed, []);
+  await page.close();
+});
