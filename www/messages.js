@@ -37,8 +37,12 @@ export function fail(error) {
   say(TITLES[error.code] ?? "The file could not be opened", error);
 }
 
+/** What the message is of: the code of an error. @type {string | undefined} */
+let code;
+
 /** Shows a message. It can be closed, and keeps out of the way of what is drawn. @param {string} title @param {any} error */
 export function say(title, error) {
+  code = error.code;
   $("message-title").textContent = title;
   const words = error.message ?? String(error);
   // A message that starts with a file's name keeps it as it is.
@@ -50,6 +54,11 @@ export function say(title, error) {
 
 export function hideMessage() {
   $("message").hidden = true;
+}
+
+/** No volume is to be drawn: hides the message that none can be. */
+export function hideRefusal() {
+  if (code === "needs-webgpu") hideMessage();
 }
 
 /** How long a note stays (in ms); longer ones stay longer. */

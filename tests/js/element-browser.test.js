@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { mkdir, readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { launch, servePackage } from "./browser.js";
+import { launch, servePackage, withoutGpu } from "./browser.js";
 import { assertDrawn, assertLike, differing, study } from "./study.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
@@ -174,11 +174,7 @@ test("the poster is shown until the first picture, and stays without WebGPU and 
   assert.deepEqual(await page.evaluate(() => window.tetralodDemo.events), ["load"]);
   await page.close();
 
-  const prepare = () => {
-    Object.defineProperty(navigator, "gpu", { value: undefined });
-    OffscreenCanvas.prototype.getContext = () => null;
-  };
-  const without = await opened(`<tetralod-viewer src="model.mt">${POSTER}</tetralod-viewer>`, { prepare });
+  const without = await opened(`<tetralod-viewer src="model.mt">${POSTER}</tetralod-viewer>`, { prepare: withoutGpu });
   await reach(without.page, "failed");
   assert.equal(await isShown(without.page), true);
   assert.match(await without.page.locator("[part=message]").textContent(), /no WebGPU/);

@@ -394,8 +394,8 @@ fn e2e() -> Result<()> {
             test(name, "CHROMIUM", &browser.chromium)?;
         }
         let firefox = browser::firefox()?;
-        println!("what needs no WebGPU, in Firefox");
-        ["core", "ranges", "webgl"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
+        println!("what needs no GPU, in Firefox");
+        ["core", "ranges"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
     })?;
     for name in ["state.test.js", "e2e.test.js", "page.test.js", "drop.test.js"] {
         let mut command = node_test(name);

@@ -16,8 +16,7 @@ pub enum GpuError {
     NoSurface(String),
     /// There is no WebGPU, which volumes are drawn with.
     #[error(
-        "the volume is not drawn: that needs WebGPU, and without it this viewer draws with WebGL 2; show slices or an isosurface \
-         instead"
+        "the volume needs WebGPU, without which this viewer draws with WebGL 2; show slices or an isosurface instead"
     )]
     NeedsWebGpu,
     /// The mesh needs a larger buffer than the device allows.
