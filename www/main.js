@@ -187,7 +187,7 @@ async function makeViewer(listed) {
 
 /** What draws. @param {import("tetralod/viewer").Viewer} viewer */
 function showDevice({ adapter, isSoftware, renderer }) {
-  const without = renderer === "webgl" && "This browser has no WebGPU: drawn with WebGL 2, without volumes.";
+  const without = renderer === "webgl" && "This browser has no WebGPU: drawn with WebGL 2, without volumes and without shade in hollows.";
   const words = isSoftware && "Drawn in software, since this browser uses no GPU: allow hardware acceleration in its settings, or update the graphics driver.";
   $("gpu").textContent = [without, words, adapter && `GPU: ${adapter}`].filter(Boolean).join(" ");
 }
