@@ -37,8 +37,10 @@ export type ErrorCode =
   | "worker"
   /** The wasm module could not be loaded or compiled; the message says what to change. */
   | "wasm"
-  /** The browser has no WebGPU, or it gives no adapter (viewer only). */
+  /** The browser has neither WebGPU nor WebGL 2, or gives no GPU for them (viewer only). */
   | "no-webgpu"
+  /** A volume cannot be drawn, since the browser has no WebGPU; all else is drawn with WebGL 2 (viewer only). */
+  | "needs-webgpu"
   /** The GPU was reset or removed, and could not be opened again; make a new viewer (viewer only). */
   | "device-lost"
   /** The mesh is larger than this GPU can hold (viewer only). */

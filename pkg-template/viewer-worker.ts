@@ -18,6 +18,7 @@ import { Frames } from "./viewer-frames.js";
 import { MeshWork } from "./viewer-mesh.js";
 import { Pace } from "./viewer-pace.js";
 import { type Met, Shown, type Wanted } from "./viewer-shown.js";
+import { GlCanvas } from "./webgl.js";
 
 /** A screenshot is the mean of so many pictures at most. */
 const MOST_SAMPLES = 256;
@@ -41,7 +42,20 @@ function on(): Stage {
 const invalidate = () => on().frames.invalidate();
 
 /** What draws. */
-const device = () => ({ adapter: on().viewer.adapter(), isSoftware: on().viewer.isSoftware });
+const device = () => {
+  const { viewer } = on();
+  return { renderer: viewer.renderer as RendererName, adapter: viewer.adapter(), isSoftware: viewer.isSoftware };
+};
+
+/** What a viewer draws with. */
+export type RendererName = "webgpu" | "webgl";
+
+/** Opens the GPU for a canvas. */
+async function opened(renderer: RendererName, canvas: OffscreenCanvas, width: number, height: number): Promise<Gpu> {
+  if (renderer === "webgpu") return Gpu.open(canvas, width, height);
+  Object.assign(canvas, { width, height });
+  return Gpu.webgl(new GlCanvas(canvas), width, height);
+}
 
 /** Another volume takes the place of the one before, of which this is drawn. */
 function forget(wanted: Wanted) {
@@ -99,8 +113,8 @@ const methods = {
     return { name: "viewer", version: VERSION };
   },
 
-  async create(canvas: OffscreenCanvas, width: number, height: number, ratio: number, frameTime: number) {
-    const viewer = new Viewer(await Gpu.open(canvas, width, height), ratio);
+  async create(canvas: OffscreenCanvas, width: number, height: number, ratio: number, frameTime: number, renderer: RendererName) {
+    const viewer = new Viewer(await opened(renderer, canvas, width, height), ratio);
     const mesh = new MeshWork(viewer, emit, invalidate);
     const pace = new Pace(viewer, mesh, frameTime, invalidate);
     stage = { viewer, mesh, pace, shown: new Shown(viewer), frames: new Frames(viewer, mesh, pace, emit) };
@@ -111,7 +125,7 @@ const methods = {
   /** Opens the GPU again after it was lost, for another canvas, and draws everything anew. */
   async restore(canvas: OffscreenCanvas, width: number, height: number, ratio: number) {
     const { viewer, frames } = on();
-    frames.restart(await Gpu.open(canvas, width, height));
+    frames.restart(await opened(viewer.renderer as RendererName, canvas, width, height));
     viewer.resize(width, height, ratio);
     invalidate();
     return device();

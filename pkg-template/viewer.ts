@@ -1,6 +1,6 @@
 /// <reference lib="esnext.disposable" preserve="true" />
 /**
- * Draws an MT on a canvas with WebGPU, and gives of its mesh what `MultiTessellation` gives.
+ * Draws an MT on a canvas with WebGPU, or WebGL 2 where there is none, and gives of its mesh what `MultiTessellation` gives.
  *
  * ```js
  * import { Viewer } from "tetralod/viewer";
@@ -26,7 +26,7 @@ import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./sta
 import { absolute, displaced } from "./stored.js";
 import { type OpenSource, type RangesSource, type Source, abortable, openSource, pump, rangesOf, transferOf } from "./stream.js";
 import { type AwaitOptions, type FieldOptions, setCaller, withMeshTools } from "./tools.js";
-import type { ViewerMethods } from "./viewer-worker.js";
+import type { RendererName, ViewerMethods } from "./viewer-worker.js";
 
 export { TetralodError, absolute, displaced };
 export type { BlockMap, Traffic } from "./results.js";
@@ -155,6 +155,12 @@ export interface ViewerOptions {
    * always draws everything.
    */
   frameTime?: number;
+  /**
+   * What it draws with, for tests: without it WebGPU, or WebGL 2 where there is no WebGPU.
+   *
+   * @throws {TetralodError} `no-webgpu` if the browser does not have it
+   */
+  renderer?: "webgpu" | "webgl" | undefined;
   /** A worker that you have made of `tetralod/viewer-worker`; it belongs to the viewer from then on. Default: its own. */
   worker?: true | Worker;
   /**
@@ -206,6 +212,7 @@ const NO_WEBGPU =
   "this browser has no WebGPU; use a current Chrome, Edge, Firefox or Safari over https (or on localhost)";
 const NO_ADAPTER =
   "the browser gives no GPU adapter; allow hardware acceleration in its settings, or update the graphics driver";
+const NO_WEBGL = "this browser has no WebGL 2; allow hardware acceleration in its settings, or update the graphics driver";
 
 const NO_PAGE = 'a viewer draws on a canvas of a page; elsewhere, use MultiTessellation of "tetralod"';
 const USED_CANVAS =
@@ -233,7 +240,7 @@ const holders = new WeakMap<HTMLCanvasElement, Viewer | undefined>();
 type Waiting = Deferred<ViewerStats> & { goal: number };
 
 /**
- * Draws an MT on a canvas with WebGPU; decoding, refinement and drawing happen in a worker.
+ * Draws an MT on a canvas with WebGPU, or WebGL 2 where there is none; decoding, refinement and drawing happen in a worker.
  *
  * Calls that are faster than the worker replace each other: only the last one is carried out.
  *
@@ -252,7 +259,7 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   /** What the picture is on where the canvas cannot show another one. */
   #cover: HTMLCanvasElement | undefined;
   #info: MtInfo | undefined;
-  #device = { adapter: "", isSoftware: false };
+  #device: { renderer: RendererName; adapter: string; isSoftware: boolean } = { renderer: "webgpu", adapter: "", isSoftware: false };
   #stream: AbortController | undefined;
   /** For a file in parts: resolves when a mesh is requested. */
   #requested: (() => void) | undefined;
@@ -272,40 +279,40 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   /** Of the canvas, in pixels. */
   #size: [number, number] = [1, 1];
 
-  /** Rejects with code `no-webgpu`, and the reason, if WebGPU is not available. */
+  /** Rejects with code `no-webgpu`, and the reason, if neither WebGPU nor WebGL 2 is available. */
   static async check(): Promise<void> {
-    const adapter = await gpuOfPage().requestAdapter().catch(() => null);
-    if (!adapter) throw new TetralodError("no-webgpu", NO_ADAPTER);
+    await rendererOfPage();
   }
 
   /**
-   * Hands the canvas to a worker; rejects with code `no-webgpu` before that if there is no WebGPU. One viewer at a time can have a
+   * Hands the canvas to a worker; rejects with code `no-webgpu` before that if there is neither WebGPU nor WebGL 2. One viewer at a time can have a
    * canvas: free it before you make another one, and pass a `signal` to give up one that is being made.
    */
   static async create(canvas: HTMLCanvasElement, options: ViewerOptions = {}): Promise<Viewer> {
-    const { signal, frameTime = 60, prefetch, ...places } = options;
+    const { signal, frameTime = 60, prefetch, renderer, ...places } = options;
     signal?.throwIfAborted();
-    checkNames(places, PLACES, ["signal", "frameTime", "prefetch"]);
+    checkNames(places, PLACES, ["signal", "frameTime", "prefetch", "renderer"]);
+    if (renderer !== undefined && renderer !== "webgpu" && renderer !== "webgl") throw badOption("renderer", 'must be "webgpu" or "webgl"');
     checkAmount("frameTime", frameTime, 1);
     if (typeof HTMLCanvasElement === "undefined") throw new TetralodError("no-webgpu", NO_PAGE);
     if (!(canvas instanceof HTMLCanvasElement)) {
       throw new TetralodError("bad-option", "`canvas` must be a canvas element");
     }
-    gpuOfPage();
+    // An adapter takes a browser some time, in which the worker loads.
+    const checked = rendererOfPage(renderer);
+    checked.catch(() => {});
+    if (!webGpu()) await checked;
     const viewer = new Viewer(canvas, places);
     viewer.#frameTime = frameTime;
     try {
-      // An adapter takes a browser some time, in which the worker loads.
-      const checked = Viewer.check();
-      checked.catch(() => {});
       const args: [string | undefined, string | undefined] = [absoluteHref("wasmUrl", places.wasmUrl), absoluteHref("prefetch", prefetch)];
       const loaded = checkWorker(VIEWER, viewer.#remote.call("load", args));
       loaded.catch(() => {});
-      await checked;
+      const found = await checked;
       signal?.throwIfAborted();
       await loaded;
       signal?.throwIfAborted();
-      await viewer.#start(frameTime);
+      await viewer.#start(frameTime, found);
       signal?.throwIfAborted();
     } catch (error) {
       viewer.free();
@@ -324,10 +331,10 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
     this.#remote = startWorker<ViewerMethods>(VIEWER, places, (name, data) => this.#heard(name, data));
   }
 
-  async #start(frameTime: number) {
+  async #start(frameTime: number, renderer: RendererName) {
     const offscreen = this.#handOver();
     const [width, height] = (this.#size = pixels(this.#canvas.getBoundingClientRect()));
-    this.#device = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio, frameTime], [offscreen]);
+    this.#device = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio, frameTime, renderer], [offscreen]);
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
@@ -414,6 +421,11 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   /** The description of the volume; `undefined` until its base mesh has arrived. */
   get info(): MtInfo | undefined {
     return this.#info;
+  }
+
+  /** What draws: WebGPU, or WebGL 2 where there is no WebGPU. It draws all but volumes, and no shade in hollows. */
+  get renderer(): "webgpu" | "webgl" {
+    return this.#device.renderer;
   }
 
   /** The name of the GPU; empty where the browser does not say it. */
@@ -810,11 +822,23 @@ function coverStyle({ offsetLeft, offsetTop, offsetWidth, offsetHeight }: HTMLEl
   return `position: absolute; pointer-events: none; ${place}`;
 }
 
-/** WebGPU; throws where a browser has none. */
-function gpuOfPage(): { requestAdapter(): Promise<object | null> } {
-  const { gpu } = (globalThis.navigator ?? {}) as { gpu?: { requestAdapter(): Promise<object | null> } };
-  if (!gpu) throw new TetralodError("no-webgpu", NO_WEBGPU);
-  return gpu;
+/** WebGPU, where a browser has it. */
+const webGpu = () => (globalThis.navigator as { gpu?: { requestAdapter(): Promise<object | null> } } | undefined)?.gpu;
+
+function hasWebGl(): boolean {
+  if (typeof OffscreenCanvas === "undefined") return false;
+  const context = new OffscreenCanvas(1, 1).getContext("webgl2");
+  // Browsers allow few of them at a time.
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return Boolean(context);
+}
+
+/** What to draw with: that which is asked for, else the better one of those that there are. */
+async function rendererOfPage(asked?: RendererName): Promise<RendererName> {
+  const gpu = webGpu();
+  if (asked !== "webgl" && (await gpu?.requestAdapter().catch(() => null))) return "webgpu";
+  if (asked !== "webgpu" && hasWebGl()) return "webgl";
+  throw new TetralodError("no-webgpu", asked === "webgl" ? NO_WEBGL : gpu ? NO_ADAPTER : NO_WEBGPU);
 }
 
 function pixels({ width, height }: { width: number; height: number }): [number, number] {

@@ -170,7 +170,8 @@ async function makeViewer(listed) {
   try {
     // Imported here, so that a missing package is reported like other errors.
     const [{ Viewer }, prefetch] = await Promise.all([import("tetralod/viewer"), wantedUrl() ?? listed.then((first) => first?.url)]);
-    return await Viewer.create(canvas, prefetch?.startsWith("file:") ? {} : { prefetch });
+    const renderer = /** @type {"webgpu" | "webgl" | null} */ (new URLSearchParams(location.search).get("renderer")) ?? undefined;
+    return await Viewer.create(canvas, { renderer, ...(!prefetch?.startsWith("file:") && { prefetch }) });
   } catch (/** @type {any} */ error) {
     demo.error = { code: error.code, message: error.message };
     const unsupported = error.code === "no-webgpu";
@@ -179,15 +180,16 @@ async function makeViewer(listed) {
     for (const id of ["volume", "open-gallery", "reset", "share"]) $(id).toggleAttribute("disabled", true);
     $("loading").hidden = true;
     $("growth").textContent = "";
-    say(unsupported ? "This page needs WebGPU" : "The viewer could not start", error);
+    say(unsupported ? "This page needs WebGPU or WebGL 2" : "The viewer could not start", error);
     return undefined;
   }
 }
 
 /** What draws. @param {import("tetralod/viewer").Viewer} viewer */
-function showDevice({ adapter, isSoftware }) {
+function showDevice({ adapter, isSoftware, renderer }) {
+  const without = renderer === "webgl" && "This browser has no WebGPU: drawn with WebGL 2, without volumes and without shade in hollows.";
   const words = isSoftware && "Drawn in software, since this browser uses no GPU: allow hardware acceleration in its settings, or update the graphics driver.";
-  $("gpu").textContent = [words, adapter && `GPU: ${adapter}`].filter(Boolean).join(" ");
+  $("gpu").textContent = [without, words, adapter && `GPU: ${adapter}`].filter(Boolean).join(" ");
 }
 
 /** What lies over the picture: axes, probes, the plot. @param {import("tetralod/viewer").Viewer} viewer */

@@ -15,6 +15,7 @@ const TITLES = {
   truncated: "The file is incomplete",
   "too-large": "The mesh is too large for this GPU",
   "bad-option": "This cannot be shown",
+  "needs-webgpu": "Volumes are not drawn without WebGPU",
 };
 
 /** Errors that may be gone when the same is tried again. */
@@ -24,6 +25,8 @@ const LASTING = /HTTP 4(?!08|25|29)\d\d/;
 
 /** Shows what went wrong. What has arrived stays usable. @param {any} error */
 export function fail(error) {
+  // All but the volume is there.
+  if (error.code === "needs-webgpu") return say(TITLES[error.code], error);
   demo.error = { code: error.code, message: error.message };
   demo.state = "failed";
   $("loading").classList.add("done");
@@ -34,8 +37,12 @@ export function fail(error) {
   say(TITLES[error.code] ?? "The file could not be opened", error);
 }
 
+/** What the message is of: the code of an error. @type {string | undefined} */
+let code;
+
 /** Shows a message. It can be closed, and keeps out of the way of what is drawn. @param {string} title @param {any} error */
 export function say(title, error) {
+  code = error.code;
   $("message-title").textContent = title;
   const words = error.message ?? String(error);
   // A message that starts with a file's name keeps it as it is.
@@ -47,6 +54,11 @@ export function say(title, error) {
 
 export function hideMessage() {
   $("message").hidden = true;
+}
+
+/** No volume is to be drawn: hides the message that none can be. */
+export function hideRefusal() {
+  if (code === "needs-webgpu") hideMessage();
 }
 
 /** How long a note stays (in ms); longer ones stay longer. */

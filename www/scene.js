@@ -10,7 +10,7 @@ import { refreshExtremes } from "./extremes.js";
 import { isovalue, isovaluePart, shownField } from "./fields.js";
 import { flowIsByField, flowScene, flowUnit } from "./flow.js";
 import { nameWithUnit } from "./lengths.js";
-import { fail } from "./messages.js";
+import { fail, hideRefusal } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
 import { beside, hasEdges, mode, opacityOf, shows } from "./parts.js";
 import { planes } from "./planes.js";
@@ -119,6 +119,7 @@ export function draw() {
   const { shrink, shade, outline, "surface-colour": by } = store.state;
   text("shrink", `${shrink} %`);
   text("shade", `${shade} %`);
+  if (!shows("volume")) hideRefusal();
   const isPlain = (mode() === "iso" && !by) || (mode() === "solid" && isByRegion());
   $("colours").hidden = isPlain && !beside().some((name) => name !== "solid");
   $("range").hidden = !isByField();

@@ -33,6 +33,17 @@ export async function launch() {
   return browser;
 }
 
+/** Run in a page: takes WebGPU and WebGL 2 from it. */
+export function withoutGpu() {
+  Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
+  const { getContext } = OffscreenCanvas.prototype;
+  OffscreenCanvas.prototype.getContext = /** @type {any} */ (
+    function (kind, ...options) {
+      return kind === "webgl2" ? null : getContext.call(this, kind, ...options);
+    }
+  );
+}
+
 /** The address that `cargo xtask` serves at. */
 export function address() {
   const page = process.env.TETRALOD_PAGE;

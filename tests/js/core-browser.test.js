@@ -100,12 +100,12 @@ test("what was ended is refused by name", async () => {
   assert.equal(code, "freed");
 });
 
-test("a browser without WebGPU says so", async () => {
+test("a browser without WebGPU and WebGL says so", async () => {
   const found = await page.evaluate(async () => {
     const { Viewer } = await import("tetralod/viewer");
     const adapter = await navigator.gpu?.requestAdapter();
     return {
-      gpu: Boolean(adapter),
+      gpu: Boolean(adapter ?? new OffscreenCanvas(1, 1).getContext("webgl2")),
       answer: await Viewer.check().then(
         () => "drawn",
         (error) => `${error.code}: ${error.message}`,

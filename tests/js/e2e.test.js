@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { address } from "./browser.js";
+import { address, withoutGpu } from "./browser.js";
 import {
   addressed,
   assertDrawn,
@@ -182,9 +182,9 @@ test("the page draws every dataset of the demo, of every kind of MT", async () =
   }
 });
 
-test("a browser without WebGPU gets a message, not a blank page", async () => {
+test("a browser without WebGPU and WebGL gets a message, not a blank page", async () => {
   const page = await open("data/sphere-flow.mt", async (page) => {
-    await page.addInitScript(() => Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined }));
+    await page.addInitScript(withoutGpu);
     // Whoever made the volumes had a GPU.
     await page.route("**/data/volumes.json", async (route) => {
       const list = await (await route.fetch()).json();

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { mkdir, readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { launch, servePackage } from "./browser.js";
+import { launch, servePackage, withoutGpu } from "./browser.js";
 import { assertDrawn, assertLike, differing, study } from "./study.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
@@ -158,7 +158,7 @@ test("pointer, wheel and keys move it; scrolling past it does not", async () => 
   await page.close();
 });
 
-test("the poster is shown until the first picture, and stays without WebGPU, with the reason", async () => {
+test("the poster is shown until the first picture, and stays without WebGPU and WebGL, with the reason", async () => {
   const isShown = (page) => page.locator("svg").isVisible();
   const { page } = await opened(`<tetralod-viewer>${POSTER}</tetralod-viewer>`);
   assert.equal(await isShown(page), true);
@@ -174,8 +174,7 @@ test("the poster is shown until the first picture, and stays without WebGPU, wit
   assert.deepEqual(await page.evaluate(() => window.tetralodDemo.events), ["load"]);
   await page.close();
 
-  const prepare = () => Object.defineProperty(navigator, "gpu", { value: undefined });
-  const without = await opened(`<tetralod-viewer src="model.mt">${POSTER}</tetralod-viewer>`, { prepare });
+  const without = await opened(`<tetralod-viewer src="model.mt">${POSTER}</tetralod-viewer>`, { prepare: withoutGpu });
   await reach(without.page, "failed");
   assert.equal(await isShown(without.page), true);
   assert.match(await without.page.locator("[part=message]").textContent(), /no WebGPU/);

@@ -69,6 +69,7 @@ export class Viewer extends EventTarget {
 
   adapter = "none";
   isSoftware = true;
+  renderer = "webgpu";
   frameTime = 60;
   info = undefined;
   legend = undefined;

@@ -18,17 +18,17 @@ const { build } = createRequire(new URL("../../tests/js/package.json", import.me
 /** Bytes. An entry that outgrows its limit needs a reason for a higher one, in the message of the commit that raises it. */
 const LIMITS = {
   ".": 16_900,
-  "./viewer": 8_700,
-  "./element": 11_200,
+  "./viewer": 9_000,
+  "./element": 11_500,
   "./three": 2_500,
   "./vtk": 2_500,
   "./build": 4_000,
   "./inline": 416_000,
   "./worker": 10_800,
-  "./viewer-worker": 21_000,
+  "./viewer-worker": 29_600,
   "./build-worker": 5_500,
   "./core.wasm": 316_000,
-  "./viewer.wasm": 499_000,
+  "./viewer.wasm": 503_000,
   "./build.wasm": 898_000,
 };
 

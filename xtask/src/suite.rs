@@ -390,7 +390,7 @@ fn e2e() -> Result<()> {
         let test = |name: &str, variable: &str, path: &Path| {
             shell::run(fixture_env(node_test(&format!("{name}-browser.test.js")).env(variable, path)))
         };
-        for name in ["core", "ranges", "streams", "parts", "viewer", "places", "element", "build"] {
+        for name in ["core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "build"] {
             test(name, "CHROMIUM", &browser.chromium)?;
         }
         let firefox = browser::firefox()?;

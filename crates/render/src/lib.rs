@@ -12,4 +12,6 @@ pub mod gpu;
 pub mod scene;
 mod scene_renderer;
 
+#[doc(hidden)]
+pub use scene_renderer::Draw;
 pub use scene_renderer::{SceneRenderer, ShowError};

@@ -1,17 +1,77 @@
 //! A scene and what draws it.
 
-use crate::gpu::{GpuError, Renderer, SideTarget, TextureView};
+use crate::draw::{Edit, Look};
+use crate::gpu::webgl::{GlContext, WebGl};
+use crate::gpu::{GpuError, Renderer, TextureView};
 use crate::scene::{Legend, Scene, SceneError, SceneState, Update};
 use tetralod::Coded;
 use tetralod::geom::{Bounds, Camera, Ray};
 use tetralod::session::{Deformation, Session};
+use tetralod::view::{MeshView, Place};
 use thiserror::Error;
 
 /// Shows a session's mesh: a [`Scene`] says what is to be drawn of it, a [`Renderer`] draws that.
 #[derive(Debug)]
-pub struct SceneRenderer {
+pub struct SceneRenderer<R: ?Sized = Renderer> {
     scene: Scene,
-    renderer: Renderer,
+    renderer: Box<R>,
+}
+
+/// What draws what a scene lists: a [`Renderer`], or another one that does what it does.
+#[doc(hidden)]
+pub trait Draw {
+    /// As [`Renderer::apply`].
+    fn apply(&mut self, edits: &[Edit<'_>]) -> Result<(), GpuError>;
+    /// As [`Renderer::set_eye`].
+    fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>);
+    /// As [`Renderer::triangles`].
+    fn triangles(&self) -> usize;
+    /// As [`Renderer::draw`].
+    fn draw(&mut self, camera: &Camera, look: &Look) -> Result<bool, GpuError>;
+    /// As [`Renderer::draw_again`].
+    fn draw_again(&mut self) -> Result<bool, GpuError>;
+}
+
+impl Draw for Renderer {
+    fn apply(&mut self, edits: &[Edit<'_>]) -> Result<(), GpuError> {
+        self.apply(edits)
+    }
+
+    fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
+        self.set_eye(mesh, place);
+    }
+
+    fn triangles(&self) -> usize {
+        self.triangles()
+    }
+
+    fn draw(&mut self, camera: &Camera, look: &Look) -> Result<bool, GpuError> {
+        self.draw(camera, look)
+    }
+
+    fn draw_again(&mut self) -> Result<bool, GpuError> {
+        self.draw_again()
+    }
+}
+
+impl<C: GlContext> Draw for WebGl<C> {
+    fn apply(&mut self, edits: &[Edit<'_>]) -> Result<(), GpuError> {
+        self.apply(edits)
+    }
+
+    fn set_eye(&mut self, _: &MeshView<'_>, _: Option<&Place>) {}
+
+    fn triangles(&self) -> usize {
+        self.triangles()
+    }
+
+    fn draw(&mut self, camera: &Camera, look: &Look) -> Result<bool, GpuError> {
+        Ok(self.draw(camera, look))
+    }
+
+    fn draw_again(&mut self) -> Result<bool, GpuError> {
+        Ok(self.draw_again())
+    }
 }
 
 /// Why something is not shown, or not all of it.
@@ -38,23 +98,60 @@ impl Coded for ShowError {
 impl SceneRenderer {
     /// An empty scene that `renderer` draws.
     pub fn new(renderer: Renderer) -> Self {
+        Self::of(Box::new(renderer))
+    }
+
+    /// Draws a picture into a view of a texture, as [`Renderer::render`] does.
+    ///
+    /// # Errors
+    /// As [`SceneRenderer::draw`].
+    pub fn render(
+        &mut self,
+        view: &TextureView,
+        session: &mut Session,
+        camera: &Camera,
+    ) -> Result<(), GpuError> {
+        self.place_eye(session, camera);
+        self.renderer.render(view, camera, self.scene.look())
+    }
+
+    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture_with`] does.
+    ///
+    /// # Errors
+    /// If the target is no image, or the device is lost or refused something.
+    pub async fn picture(
+        &mut self,
+        session: &mut Session,
+        camera: &Camera,
+        samples: u32,
+        drawn: impl FnMut(u32),
+    ) -> Result<Vec<u8>, GpuError> {
+        self.place_eye(session, camera);
+        self.renderer.picture_with(camera, self.scene.look(), samples, drawn).await
+    }
+}
+
+impl<R: Draw + ?Sized> SceneRenderer<R> {
+    /// An empty scene that `renderer` draws.
+    #[doc(hidden)]
+    pub fn of(renderer: Box<R>) -> Self {
         Self { scene: Scene::default(), renderer }
     }
 
     /// Draws with another renderer, as when the device of the one before is lost. All is computed and uploaded
     /// again.
-    pub fn set_renderer(&mut self, renderer: Renderer) {
-        self.renderer = renderer;
+    pub fn set_renderer(&mut self, renderer: impl Into<Box<R>>) {
+        self.renderer = renderer.into();
         self.scene.start_over();
     }
 
     /// The renderer.
-    pub fn renderer(&self) -> &Renderer {
+    pub fn renderer(&self) -> &R {
         &self.renderer
     }
 
     /// The renderer, to resize it for example.
-    pub fn renderer_mut(&mut self) -> &mut Renderer {
+    pub fn renderer_mut(&mut self) -> &mut R {
         &mut self.renderer
     }
 
@@ -163,48 +260,16 @@ impl SceneRenderer {
         self.renderer.draw(camera, self.scene.look())
     }
 
-    /// Draws a picture into a view of a texture, as [`Renderer::render`] does.
-    ///
-    /// # Errors
-    /// As [`SceneRenderer::draw`].
-    pub fn render(
-        &mut self,
-        view: &TextureView,
-        session: &mut Session,
-        camera: &Camera,
-    ) -> Result<(), GpuError> {
-        self.place_eye(session, camera);
-        self.renderer.render(view, camera, self.scene.look())
-    }
-
-    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture_with`] does.
-    ///
-    /// # Errors
-    /// If the target is no image, or the device is lost or refused something.
-    pub async fn picture(
+    /// Lets `draw` draw what is shown, with the renderer and the look of the scene.
+    #[doc(hidden)]
+    pub fn draw_with<T>(
         &mut self,
         session: &mut Session,
         camera: &Camera,
-        samples: u32,
-        drawn: impl FnMut(u32),
-    ) -> Result<Vec<u8>, GpuError> {
+        draw: impl FnOnce(&mut R, &Look) -> T,
+    ) -> T {
         self.place_eye(session, camera);
-        self.renderer.picture_with(camera, self.scene.look(), samples, drawn).await
-    }
-
-    /// Draws a picture on another target, as the mean of `samples`, with lines as wide in its parts as they are on the own one.
-    ///
-    /// # Errors
-    /// As [`SceneRenderer::draw`].
-    pub fn draw_on(
-        &mut self,
-        target: &mut SideTarget,
-        session: &mut Session,
-        camera: &Camera,
-        samples: u32,
-    ) -> Result<(), GpuError> {
-        self.place_eye(session, camera);
-        self.renderer.draw_on_side(target, camera, self.scene.look(), samples)
+        draw(&mut self.renderer, self.scene.look())
     }
 
     /// Draws the last picture again, for a smoother mean of several: see [`Renderer::draw_again`].

@@ -7,9 +7,11 @@
 //! [`Camera`](tetralod::geom::Camera).
 #![cfg(target_arch = "wasm32")]
 
+mod device;
 mod overlay;
 mod screenshot;
 
+use device::{Device, GlCanvas, Side};
 use glam::DVec2;
 use js_sys::Uint8Array;
 use serde::Serialize;
@@ -19,7 +21,8 @@ use tetralod::session::MappedBlock;
 use tetralod::view::BoxEdge;
 use tetralod::view::gizmo::{self, BoxFace};
 use tetralod_render::SceneRenderer;
-use tetralod_render::gpu::{Renderer, SideTarget};
+use tetralod_render::gpu::Renderer;
+use tetralod_render::gpu::webgl::WebGl;
 use tetralod_render::scene::{Legend, SceneState};
 use tetralod_web::arrays::{doubles, list, object, objects, set};
 use tetralod_web::file::File;
@@ -48,7 +51,7 @@ pub struct Viewer {
     pub(crate) file: File,
     /// What takes the place of `file` when its first bytes are here.
     next: Option<File>,
-    pub(crate) scene: SceneRenderer,
+    pub(crate) scene: SceneRenderer<dyn Device>,
     pub(crate) camera: Camera,
     pub(crate) ratio: f64,
     /// The view that the needs which follow the camera have now.
@@ -62,12 +65,13 @@ pub struct Viewer {
     /// The edges of the box whose ticks the overlay shows.
     pub(crate) tick_edges: [Option<BoxEdge>; 3],
     /// The picture beside the canvas that is being made.
-    pub(crate) screenshot: Option<SideTarget>,
+    pub(crate) screenshot: Option<Side>,
 }
 
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"import type { BlockMap } from "./results.js";
-import type { CameraState, Legend, Overlay, Reading, SceneState } from "./scene.js";"#;
+import type { CameraState, Legend, Overlay, Reading, SceneState } from "./scene.js";
+import type { GlCanvas } from "./webgl.js";"#;
 
 #[wasm_bindgen]
 extern "C" {
@@ -95,14 +99,19 @@ fn plain<T: JsCast>(data: &impl Serialize) -> T {
 
 /// A GPU that draws on a canvas.
 #[wasm_bindgen]
-pub struct Gpu(Renderer);
+pub struct Gpu(Box<dyn Device>);
 
 #[wasm_bindgen]
 impl Gpu {
     /// Opens the GPU for `canvas`, which must not have a context of another kind.
     pub async fn open(canvas: web_sys::OffscreenCanvas, width: u32, height: u32) -> Result<Gpu, WebError> {
         let target = wgpu::SurfaceTarget::OffscreenCanvas(canvas);
-        Ok(Self(Renderer::on_surface(target, [width, height]).await?))
+        Ok(Self(Box::new(Renderer::on_surface(target, [width, height]).await?)))
+    }
+
+    /// Draws with WebGL 2 on a canvas of this size.
+    pub fn webgl(canvas: GlCanvas, width: u32, height: u32) -> Gpu {
+        Self(Box::new(WebGl::new(canvas, [width, height])))
     }
 }
 
@@ -113,7 +122,7 @@ impl Viewer {
     pub fn new(gpu: Gpu, ratio: f32) -> Viewer {
         let Gpu(renderer) = gpu;
         let camera = Camera::home(&Bounds::EMPTY, renderer.aspect());
-        let mut scene = SceneRenderer::new(renderer);
+        let mut scene = SceneRenderer::of(renderer);
         scene.set_pixel_ratio(ratio);
         Self {
             file: File::default(),
@@ -145,6 +154,12 @@ impl Viewer {
     /// The GPU in words.
     pub fn adapter(&self) -> String {
         self.scene.renderer().description()
+    }
+
+    /// What draws: `"webgpu"` or `"webgl"`.
+    #[wasm_bindgen(getter)]
+    pub fn renderer(&self) -> String {
+        self.scene.renderer().kind().to_owned()
     }
 
     /// Whether the processor draws, and no GPU.
@@ -543,8 +558,8 @@ impl Viewer {
 
     /// Bytes that were uploaded to the GPU since the last question.
     #[wasm_bindgen(js_name = takeUploaded)]
-    pub fn take_uploaded(&self) -> f64 {
-        self.scene.renderer().take_uploaded() as f64
+    pub fn take_uploaded(&mut self) -> f64 {
+        self.scene.renderer_mut().take_uploaded() as f64
     }
 
     /// Bytes of memory on the GPU that pictures are made of and in.

@@ -15,8 +15,7 @@ impl Viewer {
             let problem = format!("must be at most {most} on this GPU, and `height` as well");
             return Err(WebError::bad_option("width", &problem));
         }
-        let target = wgpu::SurfaceTarget::OffscreenCanvas(canvas);
-        self.screenshot = Some(self.scene.renderer().side_target(target, size)?);
+        self.screenshot = Some(self.scene.renderer_mut().side(canvas)?);
         Ok(())
     }
 
@@ -26,7 +25,9 @@ impl Viewer {
         let Some(target) = &mut self.screenshot else { return Err(WebError::not_ready()) };
         let session = &mut self.file.session;
         self.scene.update(session)?;
-        self.scene.draw_on(target, session, &self.camera, samples)?;
+        let camera = &self.camera;
+        self.scene
+            .draw_with(session, camera, |device, look| device.draw_side(target, camera, look, samples))?;
         self.is_stale = true;
         Ok(())
     }
@@ -35,7 +36,7 @@ impl Viewer {
     /// has finished it.
     #[wasm_bindgen(js_name = isScreenshotShort)]
     pub fn is_screenshot_short(&mut self) -> bool {
-        self.screenshot.as_mut().is_some_and(|target| self.scene.renderer().is_side_short(target))
+        self.screenshot.as_mut().is_some_and(|target| self.scene.renderer_mut().is_side_short(target))
     }
 
     /// Frees what that picture has taken.

@@ -93,6 +93,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   [tets, slice.indices] satisfies Uint32Array[];
   const fast = await Viewer.create(canvas, {
     frameTime: Infinity,
+    renderer: "webgl",
     prefetch: "bucky.mt",
     workerUrl: "/viewer-worker.js",
     workerTimeoutMs: Number.POSITIVE_INFINITY,
@@ -114,6 +115,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const texts: string[] = [
     viewer.adapter,
     String(viewer.isSoftware satisfies boolean),
+    viewer.renderer satisfies "webgpu" | "webgl",
     viewer.legend?.label ?? "",
     `${found?.values["p"]}`,
     await viewer.hash(),

@@ -14,6 +14,11 @@ pub enum GpuError {
     /// WebGPU cannot draw to the canvas.
     #[error("the canvas cannot be drawn to with WebGPU: {0}")]
     NoSurface(String),
+    /// There is no WebGPU, which volumes are drawn with.
+    #[error(
+        "the volume needs WebGPU, without which this viewer draws with WebGL 2; show slices or an isosurface instead"
+    )]
+    NeedsWebGpu,
     /// The mesh needs a larger buffer than the device allows.
     #[error(
         "the {what} need {bytes} bytes in one buffer and this GPU allows {limit}; raise the error or set a smaller \
@@ -40,6 +45,7 @@ impl tetralod::Coded for GpuError {
     fn code(&self) -> &'static str {
         match self {
             Self::NoAdapter(_) | Self::NoDevice(_) | Self::NoSurface(_) => "no-webgpu",
+            Self::NeedsWebGpu => "needs-webgpu",
             Self::TooLarge { .. } => "too-large",
             Self::DeviceLost(_) => "device-lost",
             Self::Refused(_) => "gpu",

@@ -24,6 +24,8 @@ mod style;
 mod surface;
 mod target;
 mod types;
+#[doc(hidden)]
+pub mod webgl;
 mod wire;
 
 /// The version of wgpu that the renderer takes devices of.

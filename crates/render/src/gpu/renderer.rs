@@ -684,7 +684,7 @@ impl Renderer {
 
 /// Where in its pixels picture number `count` looks from: the middle, then evenly spread around it (Halton's sequence of the bases
 /// 2 and 3).
-fn shift(count: u32) -> [f64; 2] {
+pub(super) fn shift(count: u32) -> [f64; 2] {
     if count == 0 {
         return [0.0; 2];
     }

@@ -166,7 +166,7 @@ impl Surface {
 }
 
 /// The moves of all vertices, with their slopes if they have some: these are of points as they are stored.
-fn stored_moves(triangles: &Triangles<'_>, points: &SinglePoints) -> Vec<f32> {
+pub(super) fn stored_moves(triangles: &Triangles<'_>, points: &SinglePoints) -> Vec<f32> {
     let Triangles { moves, slopes, .. } = triangles;
     if slopes.is_empty() {
         return moves.iter().flatten().map(|x| *x as f32).collect();
@@ -185,7 +185,7 @@ fn or_one<'a, T>(items: &'a [T], one: &'a [T]) -> &'a [T] {
 }
 
 /// The corners of a triangle with a bit at those whose side to the next one is no edge.
-fn packed((triangle, inner): (&[u32; 3], &u8)) -> [u32; 3] {
+pub(super) fn packed((triangle, inner): (&[u32; 3], &u8)) -> [u32; 3] {
     [0, 1, 2].map(|k| triangle[k] | u32::from(inner >> k & 1) << 31)
 }
 

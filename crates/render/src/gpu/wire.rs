@@ -97,7 +97,7 @@ fn draw(
 }
 
 /// The twelve edges of a box.
-fn edges<'a>(lines: &'a BoxLines, stored: &'a SinglePoints) -> impl Iterator<Item = Line> + 'a {
+pub(super) fn edges<'a>(lines: &'a BoxLines, stored: &'a SinglePoints) -> impl Iterator<Item = Line> + 'a {
     let corner = |i: usize| stored.store(corner(&lines.bounds, i));
     let pairs = (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(a, b)| a != b);
     pairs.map(move |(a, b)| Line {
@@ -108,7 +108,7 @@ fn edges<'a>(lines: &'a BoxLines, stored: &'a SinglePoints) -> impl Iterator<Ite
     })
 }
 
-fn handles<'a>(lines: &'a BoxLines, stored: &'a SinglePoints) -> impl Iterator<Item = Line> + 'a {
+pub(super) fn handles<'a>(lines: &'a BoxLines, stored: &'a SinglePoints) -> impl Iterator<Item = Line> + 'a {
     BoxFace::ALL.into_iter().map(|face| {
         let at = stored.store(face.handle(&lines.bounds).into());
         Line { from: at, to: at, colour: premultiplied(lines.colour), width: HANDLE }
