@@ -68,7 +68,7 @@ import type {
 import type { Answer, Args, NodeWorker, Remote } from "./rpc.js";
 import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./start.js";
 import { type Absolute, absolute, displaced, fieldsOf } from "./stored.js";
-import { type RangesSource, type Source, abortable, isRepeatable, openSource, pump, rangesOf } from "./stream.js";
+import { type FilePart, type RangesSource, type Source, abortable, isRepeatable, openSource, pump, rangesOf } from "./stream.js";
 import type { SurfaceOptions } from "./surfaces.js";
 import { type AsideOptions, type AwaitOptions, type FieldOptions, type MeshTools, setCaller, withMeshTools } from "./tools.js";
 
@@ -88,6 +88,7 @@ export type {
   FieldStats,
   FieldSums,
   FieldValues,
+  FilePart,
   IsoSurface,
   LineProfile,
   Mesh,

@@ -5,6 +5,7 @@
 
 import { type TetralodError, known, ofFile, reviveError } from "./errors.js";
 import type { Traffic } from "./results.js";
+import type { FilePart } from "./stream.js";
 import type { RangeLoader } from "./tetralod_core.js";
 
 /** The headers that the loader reads, in its order. */
@@ -49,6 +50,8 @@ export interface RangesOptions {
   timeoutMs?: number;
   /** Is read instead of a server. */
   blob?: Blob;
+  /** So is a part of a file; nothing else of that is asked for. */
+  part?: FilePart;
   /** Stands for the address in messages. */
   name?: string;
 }
@@ -121,9 +124,12 @@ export class Ranges {
 
   constructor(Loader: Loader, url: string, sink: RangesSink, options: RangesOptions = {}) {
     // What a file of the user does not give at once, it does not give later.
-    if (options.blob) options = { ...options, fetch: sliceOf(options.blob), retries: 0, cache: undefined };
+    const { blob, part = blob && { blob, ranges: [0, blob.size], total: blob.size } } = options;
+    // What is between ranges cannot be fetched with them.
+    if (part) options = { ...options, fetch: sliceOf(part), retries: 0, cache: undefined, gap: 0 };
     const { maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs } = options;
     this.#loader = new Loader(maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs, Math.random());
+    if (options.part) this.#loader.hold(Float64Array.from(options.part.ranges));
     this.#url = this.#ledTo = new URL(url, globalThis.location?.href).href;
     this.#options = options;
     // What the caller's own function puts into a request is meant for the address that was given.
@@ -425,16 +431,28 @@ class SharedVersion implements Kept {
   }
 }
 
-/** Answers requests for ranges of `blob` as a server would, by slices of it. */
-function sliceOf(blob: Blob): Fetch {
+/** Answers requests for ranges of a file as a server would, by slices of the blob with those that are there. */
+function sliceOf({ blob, ranges, total }: FilePart): Fetch {
   return async (_, { headers }) => {
     const [, first, last] = /^bytes=(\d+)-(\d*)$/.exec(headers.get("range") ?? "") ?? ["", "0", ""];
     const start = Number(first);
-    const end = last === "" ? blob.size : Math.min(Number(last) + 1, blob.size);
-    if (start >= end) return new Response(null, { status: 416, headers: { "content-range": `bytes */${blob.size}` } });
-    const range = { "content-range": `bytes ${start}-${end - 1}/${blob.size}`, "content-length": String(end - start), etag: '"blob"' };
-    return new Response(blob.slice(start, end), { status: 206, headers: range });
+    const [at, until] = placeOf(ranges, start);
+    const end = Math.min(last === "" ? until : Number(last) + 1, until);
+    if (start >= end) return new Response(null, { status: 416, headers: { "content-range": `bytes */${total}` } });
+    const range = { "content-range": `bytes ${start}-${end - 1}/${total}`, "content-length": String(end - start), etag: '"blob"' };
+    return new Response(blob.slice(at, at + end - start), { status: 206, headers: range });
   };
+}
+
+/** Where a byte of the file is in the blob, and where its range ends. */
+function placeOf(ranges: readonly number[], byte: number): [at: number, end: number] {
+  let before = 0;
+  for (let i = 0; i < ranges.length; i += 2) {
+    const [start, end] = [ranges[i], ranges[i + 1]];
+    if (byte >= start && byte < end) return [before + byte - start, end];
+    before += end - start;
+  }
+  return [before, 0];
 }
 
 /** Ranges of one version of one file in Cache Storage. Nothing depends on it: whatever fails is as if it were empty. */

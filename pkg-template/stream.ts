@@ -17,7 +17,23 @@ export type Source =
   | ArrayBuffer
   | ArrayBufferView
   | ReadableStream<Uint8Array>
-  | AsyncIterable<Uint8Array>;
+  | AsyncIterable<Uint8Array>
+  | FilePart;
+
+/**
+ * A part of an MT file: what stands in front of its blocks, and some of these, as pages of `tetralod html` have it. A request that needs
+ * other blocks gives the best mesh without them, with `limitedBy: "part"`.
+ */
+export interface FilePart {
+  /** The bytes of all ranges, one behind the other. */
+  blob: Blob;
+  /** Start and end of each range in the file, ascending. */
+  ranges: readonly number[];
+  /** The size of the file. */
+  total: number;
+  /** What to call it in messages. */
+  name?: string;
+}
 
 /** Bytes in memory are handed on in pieces of this size, so that progress shows and abort works. */
 const PIECE = 1 << 20;
@@ -214,11 +230,18 @@ export interface RangesSource {
   headers?: [string, string][];
   credentials?: RequestCredentials;
   blob?: Blob;
+  part?: FilePart;
   name?: string;
 }
 
-/** The same of `source`, if that is a file on a server or of the user. */
+const isPart = (source: Source): source is FilePart => "ranges" in Object(source);
+
+/** The same of `source`, if that is a file on a server or of the user, or a part of one. */
 export function rangesOf(source: Source, { headers, credentials }: Along = {}): RangesSource | undefined {
+  if (isPart(source)) {
+    const { blob, ranges, total, name = "part" } = source;
+    return { url: `blob:${encodeURIComponent(name)}`, part: { blob, ranges: [...ranges], total }, name };
+  }
   // A Blob without content is a file that ended too early. Node 20 crashes when a worker reads a Blob that is backed by a file.
   if (isInstance(source, "Blob") && source.size > 0 && !nodeModule("node:worker_threads")) {
     const name = source.name || "blob";
@@ -237,7 +260,7 @@ export function rangesOf(source: Source, { headers, credentials }: Along = {}): 
 /** Whether `source` can be read again. */
 export function isRepeatable(source: Source): boolean {
   if (isInstance(source, "Request")) return source.method === "GET";
-  return urlOf(source) !== undefined || isInstance(source, "Blob") || source instanceof ArrayBuffer || ArrayBuffer.isView(source);
+  return urlOf(source) !== undefined || isPart(source) || isInstance(source, "Blob") || source instanceof ArrayBuffer || ArrayBuffer.isView(source);
 }
 
 /** `url` as it means the same in a worker; as it is where it means nothing. */

@@ -6,6 +6,7 @@ import {
   applyChanges,
   emptyMesh,
   type ErrorCode,
+  type FilePart,
   type IsoSurface,
   type Mesh,
   type MtInfo,
@@ -61,6 +62,9 @@ const { tets: some, stats: limited } = await view.refine({ error: "5%" }, { arra
 const beside: IsoSurface = await mt.isosurface(0.5, { normals: "smooth", request: { error: "10%" } });
 
 const local = await MultiTessellation.open(source, { worker: false });
+// Compiled only: pages of `tetralod html` have such parts.
+export const part: FilePart = { blob: new Blob(), ranges: [0, 99], total: 999, name: "small.mt" };
+part satisfies Source;
 const where: Where = ({ errors }) => errors.map((error) => error / 0.1);
 const asked = await local.refine({ where }, { deltas: true });
 const told: Mesh = applyChanges(emptyMesh(), asked);
