@@ -155,6 +155,7 @@ export class TetralodViewerElement extends Base {
   /** Set by property: anything that a viewer opens. */
   #source: Source | undefined;
   #state: ViewerChanges = {};
+  #asked: ViewerRefineOptions | undefined;
   #status: "empty" | "loading" | "ready" | "failed" = "empty";
   #error: Error | undefined;
   /** Counts what has been opened. */
@@ -181,7 +182,7 @@ export class TetralodViewerElement extends Base {
   connectedCallback() {
     // Set before the element was defined.
     const own = this as unknown as Record<string, unknown>;
-    for (const name of [...Object.values(ATTRIBUTES), "source", "state"]) {
+    for (const name of [...Object.values(ATTRIBUTES), "source", "state", "request"]) {
       if (!Object.hasOwn(own, name)) continue;
       const value = own[name];
       delete own[name];
@@ -233,6 +234,16 @@ export class TetralodViewerElement extends Base {
 
   set source(source: Source | null) {
     [this.#source, this.#isOther] = [source ?? undefined, true];
+    this.#soon();
+  }
+
+  /** A request, as for `Viewer.refine`: it takes the place of what the attributes ask for. Not an attribute. */
+  get request(): ViewerRefineOptions | null {
+    return this.#asked ?? null;
+  }
+
+  set request(request: ViewerRefineOptions | null) {
+    this.#asked = request ?? undefined;
     this.#soon();
   }
 
@@ -288,7 +299,7 @@ export class TetralodViewerElement extends Base {
     if (!viewer || !source) return this.#become("empty");
     this.#become("loading");
     // The first picture has the right things in it.
-    const { info, dropped } = await viewer.open(source, { signal: life.signal, state: this.#scene() });
+    const { info, dropped } = await viewer.open(source, { signal: life.signal, state: this.#scene(), request: this.#asked });
     if (mine !== this.#opened) return;
     if (dropped.length > 0) this.#state = kept(this.#state, viewer.state);
     await viewer.set(this.#scene(info));
@@ -356,6 +367,7 @@ export class TetralodViewerElement extends Base {
 
   /** Which mesh is drawn: without `error`, one that is right within a pixel. */
   #request(): ViewerRefineOptions {
+    if (this.#asked) return this.#asked;
     const [error, field, most] = ["error", "field", "max-tets"].map((name) => this.getAttribute(name) ?? undefined);
     const isNumber = error !== undefined && error.trim() !== "" && Number.isFinite(Number(error));
     const need = error === undefined ? { view: { pixels: 1, outside: "10%" } } : { error: isNumber ? Number(error) : error };
@@ -488,6 +500,7 @@ if (globalThis.customElements && !customElements.get(NAME)) customElements.defin
 export interface TetralodViewerJsx {
   src?: string | URL | null | undefined;
   source?: Source | null | undefined;
+  request?: ViewerRefineOptions | null | undefined;
   mode?: ViewerMode | null | undefined;
   isovalue?: string | number | readonly number[] | null | undefined;
   field?: string | null | undefined;
