@@ -42,6 +42,7 @@ const ELSEWHERE = {
     "python: python/tests/test_pages.py",
     "sh: the commands that run all tests; `release` of xtask compiles the command with the page, cli/tests/command/view.rs views",
   ],
+  "docs/command.md": ["sh: `release` of xtask compiles the command with the page; cli/tests/command/html.rs makes pages"],
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
   "docs/hosting.md": ["sh: needs an account of S3"],
@@ -49,6 +50,7 @@ const ELSEWHERE = {
   "docs/howto/deformed.md": ["sh: the commands of movies.md are run"],
   "docs/howto/movies.md": ["sh: needs ffmpeg"],
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
+  "docs/howto/one-file.md": ["sh: cli/tests/command/html.rs and html-browser.test.js make such pages; the command here is without the viewer"],
   "docs/howto/python.md": ["python: python/tests/test_pages.py"],
 };
 
