@@ -159,8 +159,11 @@ element.addEventListener("legend", ({ detail }) => {
   );
 });
 
-element.addEventListener("error", () => {
+function failed() {
   if (!element.info) status.textContent = "A picture of it: the volume cannot be shown here.";
-});
+}
+element.addEventListener("error", failed);
+// Where there is no WebGPU, that has shown before this script began.
+if (element.failure) failed();
 
 Object.assign(element, { request, state: { ...scene, camera: camera() }, source: part() });
