@@ -299,7 +299,7 @@ export class TetralodViewerElement extends Base {
     if (!viewer || !source) return this.#become("empty");
     this.#become("loading");
     // The first picture has the right things in it.
-    const { info, dropped } = await viewer.open(source, { signal: life.signal, state: this.#scene() });
+    const { info, dropped } = await viewer.open(source, { signal: life.signal, state: this.#scene(), request: this.#given });
     if (mine !== this.#opened) return;
     if (dropped.length > 0) this.#state = kept(this.#state, viewer.state);
     await viewer.set(this.#scene(info));

@@ -134,11 +134,14 @@ export class Ranges {
     if (reader) {
       const remote = new Remote<ReaderMethods>(portEndpoint(reader.port));
       const read = async (start: number, end: number) => (await remote.call("read", [start, end])).bytes;
-      options = { timeoutMs: FOREVER, ...options, fetch: answering(reader.size, read), retries: 0, cache: undefined };
+      options = { timeoutMs: FOREVER, ...options, fetch: answering(reader.size, read, reader.ranges), retries: 0, cache: undefined };
+      // What is between the ranges that are there cannot be asked for with them.
+      if (reader.ranges) options.gap = 0;
       this.#release = () => remote.close(new Error("the file was closed"));
     }
     const { maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs } = options;
     this.#loader = new Loader(maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs, Math.random());
+    if (reader?.ranges) this.#loader.hold(Float64Array.from(reader.ranges));
     this.#url = this.#ledTo = new URL(url, globalThis.location?.href).href;
     this.#options = options;
     // What the caller's own function puts into a request is meant for the address that was given.
@@ -447,12 +450,13 @@ class SharedVersion implements Kept {
   }
 }
 
-/** Answers requests for ranges of a file of this size as a server would, by what `read` gives. */
-function answering(size: number, read: (start: number, end: number) => BodyInit | Promise<BodyInit>): Fetch {
+/** Answers requests for ranges of a file of this size as a server would, by what `read` gives of those that are there. */
+function answering(size: number, read: (start: number, end: number) => BodyInit | Promise<BodyInit>, there: readonly number[] = [0, size]): Fetch {
   return async (_, { headers }) => {
     const [, first, last] = /^bytes=(\d+)-(\d*)$/.exec(headers.get("range") ?? "") ?? ["", "0", ""];
     const start = Number(first);
-    const end = last === "" ? size : Math.min(Number(last) + 1, size);
+    const until = there.find((_, i) => i % 2 === 1 && there[i - 1] <= start && start < there[i]) ?? 0;
+    const end = last === "" ? until : Math.min(Number(last) + 1, until);
     if (start >= end) return new Response(null, { status: 416, headers: { "content-range": `bytes */${size}` } });
     const range = { "content-range": `bytes ${start}-${end - 1}/${size}`, "content-length": String(end - start), etag: '"file"' };
     return new Response(await read(start, end), { status: 206, headers: range });

@@ -139,6 +139,8 @@ export interface BlockProgress {
   needed: number;
   /** Those of them that are not fetched because there is no room for them. */
   leftOut: number;
+  /** Those of them that cannot come: a part of a file is open (`RangeReader` with `ranges`), which does not have them. */
+  absent: number;
   /** Bytes of memory that the blocks take. */
   bytes: number;
   /** Blocks that meshes needed although the file's index says that they cannot: 0 for every sound file. */
@@ -409,10 +411,10 @@ export interface RefineStats extends CoreStats {
   milliseconds: number;
   /**
    * What keeps the mesh from being finer: `error`: it is as accurate as was asked for, or the finest that there is; `budget`: it has
-   * as many tetrahedra as were allowed; `network`: data is on its way; `memory`: blocks that it needs do not fit into `memory`.
-   * `undefined` until `done`.
+   * as many tetrahedra as were allowed; `network`: data is on its way; `memory`: blocks that it needs do not fit into `memory`;
+   * `part`: a part of a file is open (`RangeReader` with `ranges`), which does not have them. `undefined` until `done`.
    */
-  limitedBy: "error" | "budget" | "network" | "memory" | undefined;
+  limitedBy: "error" | "budget" | "network" | "memory" | "part" | undefined;
 }
 
 /** The blocks of a file in space, in the order of the file. */

@@ -32,6 +32,11 @@ export interface RangeReader {
    * away. What it throws ends the reading, and is the error of whoever waits; with a `code` of `ErrorCode` it keeps that.
    */
   read(start: number, end: number): Uint8Array | Promise<Uint8Array>;
+  /**
+   * Where the file is not all there, as in pages of `tetralod html`: start and end of each range that is, ascending; the first has all in
+   * front of the blocks. A request that needs others gives the best mesh without them, with `limitedBy: "part"`.
+   */
+  ranges?: readonly number[];
 }
 
 /** Bytes in memory are handed on in pieces of this size, so that progress shows and abort works. */
@@ -70,7 +75,10 @@ export async function openSource(source: Source, signal?: AbortSignal, { headers
   if (url !== undefined) return openResponse(await request(source as string | URL | Request, url, { signal, headers, credentials }), url);
   if (isInstance(source, "Response")) return openResponse(source, source.url || "response");
   if (isInstance(source, "Blob")) return open(source.name || "blob", source.size, source.stream());
-  if (isReader(source)) return { name: source.name, total: source.size, chunks: piecesOf(source) };
+  if (isReader(source)) {
+    if (source.ranges) throw new TetralodError("bad-source", `${source.name} is a part of a file, which cannot be read as a whole`);
+    return { name: source.name, total: source.size, chunks: piecesOf(source) };
+  }
   const bytes = bytesOf(source);
   if (bytes) return { name: "bytes", total: bytes.byteLength, chunks: pieces(bytes) };
   return open("stream", undefined, source);
@@ -256,6 +264,7 @@ export interface RangesSource {
 export interface ReaderPort {
   size: number;
   port: MessagePort;
+  ranges?: readonly number[];
 }
 
 /** What is answered there. */
@@ -282,8 +291,8 @@ export function rangesOf(source: Source, { headers, credentials }: Along = {}): 
     return { url: `blob:${encodeURIComponent(name)}`, blob: source, name };
   }
   if (isReader(source)) {
-    const { name, size } = source;
-    return { url: `reader:${encodeURIComponent(name)}`, reader: { size, port: portOf(source) }, name };
+    const { name, size, ranges } = source;
+    return { url: `reader:${encodeURIComponent(name)}`, reader: { size, port: portOf(source), ...(ranges && { ranges: [...ranges] }) }, name };
   }
   const given = urlOf(source);
   const url = given === undefined ? "" : absolute(given);

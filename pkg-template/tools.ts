@@ -235,6 +235,7 @@ export function limitOf(
   if (satisfied) return "error";
   if (missing) return "network";
   if (blocks && blocks.leftOut > 0) return "memory";
+  if (blocks && blocks.absent > 0) return "part";
   return ["maxTets", "maxVertices", "maxBytes"].some((name) => request[name] !== undefined) ? "budget" : "error";
 }
 

@@ -26,6 +26,7 @@ import { type Kind, PLACES, absoluteHref, checkWorker, startWorker } from "./sta
 import { absolute, displaced } from "./stored.js";
 import { type OpenSource, type RangesSource, type Source, abortable, openSource, pump, rangesOf, transferOf } from "./stream.js";
 import { type AwaitOptions, type FieldOptions, setCaller, withMeshTools } from "./tools.js";
+import { startViewer, viewerRemedy, viewerScript, viewerWasm } from "./viewer-files.js";
 import type { RendererName, ViewerMethods } from "./viewer-worker.js";
 
 export { TetralodError, absolute, displaced };
@@ -222,9 +223,9 @@ const USED_CANVAS =
 const VIEWER: Kind = {
   name: "viewer",
   entry: "tetralod/viewer-worker",
-  start: () => new Worker(new URL("./viewer-worker.js", import.meta.url), { type: "module" }),
-  script: () => new URL("./viewer-worker.js", new URL("./tetralod_viewer_bg.wasm", import.meta.url)),
-  remedy: ", or pass a `worker` that you have made",
+  start: startViewer,
+  script: viewerScript,
+  remedy: viewerRemedy,
 };
 
 /** A GPU that is lost is opened again after these waits (in ms): drivers take some time to start. */
@@ -305,8 +306,8 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
     const viewer = new Viewer(canvas, places);
     viewer.#frameTime = frameTime;
     try {
-      const args: [string | undefined, string | undefined] = [absoluteHref("wasmUrl", places.wasmUrl), absoluteHref("prefetch", prefetch)];
-      const loaded = checkWorker(VIEWER, viewer.#remote.call("load", args));
+      const [wasm, ahead] = [absoluteHref("wasmUrl", places.wasmUrl), absoluteHref("prefetch", prefetch)];
+      const loaded = checkWorker(VIEWER, viewer.#remote.call("load", [wasm ?? (await viewerWasm()), ahead]));
       loaded.catch(() => {});
       const found = await checked;
       signal?.throwIfAborted();

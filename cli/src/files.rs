@@ -11,7 +11,9 @@ use std::time::Duration;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode_to};
 use tetralod::mt::{Exact, Mt, MtInfo};
 use tetralod::session::{Client, Session};
-use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, Traffic, WantedRange};
+use tetralod::stream::{
+    Arrived, FileSource, PartSource, RangeSet, RangeSource, StreamError, Traffic, WantedRange,
+};
 use tetralod::stream::{HttpOptions, HttpSource};
 use tetralod_build::verify::Reference;
 use tetralod_build::{Construction, Method};
@@ -102,7 +104,8 @@ pub fn ending(path: &Path) -> String {
 }
 
 /// What output files are called, and which command writes them.
-const ENDINGS: [(&[&str], &str); 5] = [
+const ENDINGS: [(&[&str], &str); 6] = [
+    (&["html"], "`tetralod html` writes .html"),
     (&["mt"], "`tetralod build` writes .mt"),
     (&["vtu", "npz"], "`tetralod extract` writes .vtu and .npz"),
     (
@@ -309,14 +312,23 @@ impl RangeSource for Bytes {
         self.0.total()
     }
 
+    fn held(&self) -> Option<&RangeSet> {
+        self.0.held()
+    }
+
     fn traffic(&self) -> Option<Traffic> {
         self.0.traffic()
     }
 }
 
 impl Bytes {
+    /// Of a part of a file.
+    pub fn of_part(part: PartSource) -> Self {
+        Self(Box::new(part))
+    }
+
     /// Of a path, or of an address that begins with `http://` or `https://`.
-    fn of(path: &Path) -> Result<Self> {
+    pub fn of(path: &Path) -> Result<Self> {
         if let Some(url) = url(path) {
             return Ok(Self(Box::new(HttpSource::new(url, HttpOptions::default()))));
         }

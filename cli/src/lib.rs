@@ -13,6 +13,7 @@ mod extract;
 mod extremes;
 mod files;
 mod generate;
+mod html;
 mod info;
 mod input;
 mod isosurface;
@@ -71,6 +72,7 @@ enum Command {
     Streamlines(Box<streamlines::Arguments>),
     Stats(Box<stats::Arguments>),
     Render(Box<render::Arguments>),
+    Html(Box<html::Arguments>),
     Verify(verify::Arguments),
     Bench(bench::Arguments),
     Serve(serve::Arguments),
@@ -116,6 +118,7 @@ fn run_command(command: Command, again: &[OsString]) -> anyhow::Result<u8> {
         Command::Streamlines(arguments) => streamlines::run(&arguments)?,
         Command::Stats(arguments) => stats::run(&arguments)?,
         Command::Render(arguments) => render::run(&arguments)?,
+        Command::Html(arguments) => html::run(&arguments)?,
         Command::Serve(arguments) => serve::run(&arguments)?,
         Command::View(arguments) => view::run(&arguments, again)?,
         Command::Completions(arguments) => completions::run(&arguments)?,

@@ -79,6 +79,16 @@ impl Query {
         named.chain([&self.file])
     }
 
+    /// The largest size of the mesh.
+    pub fn limits(&self) -> Budget {
+        Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes }
+    }
+
+    /// Whether refinement may end before the mesh is what was asked for.
+    pub fn is_stopped_early(&self) -> bool {
+        self.max_ms.is_some() || self.max_updates.is_some()
+    }
+
     /// The values of the isosurfaces that the mesh is refined around by `--iso`.
     pub fn isovalues(&self) -> &[f64] {
         self.group.isovalues()
@@ -186,22 +196,29 @@ impl Query {
         if let Err(wrong) = self.group.check() {
             crate::usage::refuse_usage(&wrong);
         }
-        self.refined(scope, fetch_more).with_context(|| self.file.display().to_string())
+        files::open_parts(&self.file)
+            .and_then(|client| self.refined(client, scope, fetch_more))
+            .with_context(|| self.file.display().to_string())
+    }
+
+    /// [`Query::answer`] of a file that is open.
+    pub fn answer_from(&self, client: Client<Bytes>) -> Result<Answer> {
+        self.refined(client, &Scope::default(), |_| Ok(())).with_context(|| self.file.display().to_string())
     }
 
     fn refined(
         &self,
+        mut client: Client<Bytes>,
         scope: &Scope,
         fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>,
     ) -> Result<Answer> {
-        let mut client = files::open_parts(&self.file)?;
         let mt = client.session().mt().context("the MT has no description")?;
         let info = mt.info();
         let field = self.field_index(info)?;
         let steps = if scope.at_all_times { steps::in_order(info, field)? } else { vec![field] };
         let (field, needs) = (steps[0], self.named_needs(mt, &steps, scope)?);
-        let budget = Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes };
-        client.request(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
+        let needed = needs.iter().map(|named| named.need.clone()).collect();
+        client.request(&Request { needs: needed, budget: self.limits() })?;
         while !client.fetch(PATIENCE)? {}
         fetch_more(&mut client)?;
         let start = Instant::now();
@@ -305,7 +322,7 @@ pub struct Answer {
 }
 
 /// The mesh that a result is from, and the error that is guaranteed, as programs get them.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub struct Summary {
     pub field: String,
     /// Of the step of the field, if it is known.
@@ -341,7 +358,7 @@ pub struct Summary {
 }
 
 /// What a request took of a network.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub struct NetworkReport {
     pub requests: u64,
     /// How often something was asked for while nothing was on its way.
@@ -357,7 +374,7 @@ impl NetworkReport {
 }
 
 /// What was asked for in one need, and what is guaranteed.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub struct NeedReport {
     /// In words.
     pub need: String,

@@ -2,7 +2,7 @@
 
 mod movie;
 mod picture;
-mod shown;
+pub mod shown;
 
 use super::deform::Displaced;
 use super::parse::{one_of, parse_numbers, parse_positive};
@@ -21,7 +21,7 @@ use tetralod::mesh::Averaged;
 use tetralod::mt::MtInfo;
 use tetralod::session::Session;
 use tetralod_render::gpu::{GpuError, Renderer, wait};
-use tetralod_render::scene::{Background, Legend};
+use tetralod_render::scene::{Background, Legend, SceneState};
 use tetralod_render::{SceneRenderer, ShowError};
 
 const PICTURE: &str = "Picture";
@@ -79,7 +79,7 @@ pub struct Arguments {
 /// The options that place the camera.
 #[derive(clap::Args)]
 #[command(next_help_heading = CAMERA)]
-struct Placed {
+pub struct Placed {
     /// The side from which it is seen; home is the front, a little from the right and from above.
     #[arg(long, value_name = "SIDE", value_parser = one_of(SIDES), default_value = "home", allow_hyphen_values = true)]
     from: ViewPreset,
@@ -112,7 +112,7 @@ const SIDES: [(&str, ViewPreset); 7] = [
     ("-z", ViewPreset::AlongZ),
 ];
 
-fn parse_dimensions(text: &str) -> Result<[u32; 2], String> {
+pub fn parse_dimensions(text: &str) -> Result<[u32; 2], String> {
     let wrong = || format!("'{text}' is no width and height in pixels, such as 1280x960");
     let (width, height) = text.split_once('x').ok_or_else(wrong)?;
     let [width, height] = [width, height].map(|side| side.trim().parse().ok().filter(|side| *side > 0));
@@ -134,6 +134,11 @@ impl Placed {
         let farthest = cameras.iter().map(Camera::distance).fold(0.0, f64::max);
         cameras.iter_mut().for_each(|camera| camera.zoom(farthest / camera.distance() / self.zoom));
         cameras
+    }
+
+    /// The camera of one picture.
+    pub fn camera_of_one(&self, bounds: &Bounds, aspect: f64) -> Camera {
+        self.cameras(bounds, aspect, &[Frame::default()]).remove(0)
     }
 
     /// The camera that looks in the right direction, `turned` by so many degrees around the model.
@@ -364,6 +369,18 @@ fn print_scene(arguments: &Arguments) -> Result<()> {
     let field = &info.fields[arguments.query.field_index(info).with_context(name)?];
     let is_box = opened.session.is_box() == Some(true);
     output::json(&arguments.shown.state(&arguments.query, &About { bounds, is_box, field })?)
+}
+
+/// A picture of a scene, as the bytes of a PNG.
+pub fn png(session: &mut Session, state: &SceneState, camera: &Camera, size: [u32; 2]) -> Result<Vec<u8>> {
+    let mut scene = SceneRenderer::new(renderer(size)?);
+    scene.set_state(state.clone()).map_err(explained)?;
+    scene.update(session).map_err(explained)?;
+    let pixels = wait(scene.picture(session, camera, 16, |_| ())).map_err(explained)?;
+    let is_transparent = state.background == Background::Transparent;
+    let mut bytes = Vec::new();
+    Picture { size, pixels, is_transparent, about: String::new() }.write(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// A renderer of pictures of this size.

@@ -181,3 +181,21 @@ def test_the_command_is_in_the_package(tmp_path):
     assert done.returncode == 2 and "Usage: tetralod slice" in done.stderr
     script = os.path.join(os.path.dirname(sys.executable), "tetralod")
     assert subprocess.run([script, "--version"], capture_output=True, text=True).stdout == command("--version")
+
+
+def test_a_page_is_one_file(ball, folder):
+    (folder / "page" / "pkg").mkdir(parents=True)
+    for name, content in [("index.html", ""), ("pkg/viewer.js", ""), ("pkg/inline-viewer.js", "let viewer;")]:
+        (folder / "page" / name).write_text(content)
+    options = {"page": folder / "page", "no_poster": True}
+    text = ball.to_html(error="10%", isovalue=[0.5, 0.75], box=(0, 0, 0, 1, 1, 1), from_="+x", title="ball", **options)
+    assert "<title>ball</title>" in text and '"value":0.75' in text and '"box":[0.0' in text
+    ball.save("ball.mt")
+    assert tetralod.open("ball.mt").to_html(folder / "ball.html", error="10%", isovalue=[0.5], **options) is None
+    assert len((folder / "ball.html").read_text()) < len(ball.to_html(**options))
+    for wrong in ({"errors": 1}, {"error": "-1"}, {"max_updates": 3}):
+        with pytest.raises(tetralod.TetralodError) as caught:
+            ball.to_html(**wrong, **options)
+        assert caught.value.code == "bad-option"
+    with pytest.raises(tetralod.TetralodError, match="viewer.js"):
+        ball.to_html(page=folder)

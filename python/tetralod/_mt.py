@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
+import tempfile
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Union
@@ -205,6 +209,34 @@ class Mt:
         assert self._given is not None
         return self._given
 
+    def to_html(self, path: str | os.PathLike[str] | None = None, **options: Any) -> str | None:
+        """Writes one HTML file that shows the volume, with the viewer and just the blocks that a request needs; without a path, gives its text.
+
+        ``options`` are those of ``tetralod html``, which ``docs/command.md`` describes, with ``_`` for ``-`` and ``from_`` for ``from``: ``error="1%"``,
+        ``isovalue=[0.3, 0.6]``, ``box=(0, 0, 0, 1, 1, 1)``, ``map="turbo"``, ``bytes="3M"``, ``no_poster=True``. A list gives an option several times, a
+        tuple is the numbers of one. The page opens from a disk and out of a mail, and asks for nothing elsewhere.
+
+        Raises ``TetralodError``: ``bad-option`` if the options are wrong; ``bad-source`` if the page cannot be made.
+        """
+        data, name, _network = self._source()
+        words = [word for name, value in options.items() for word in _words(name, value)]
+        with tempfile.TemporaryDirectory() as folder:
+            source = name
+            if isinstance(data, bytes):
+                source = os.path.join(folder, "volume.mt")
+                Path(source).write_bytes(data)
+            target = os.path.join(folder, "page.html") if path is None else os.fspath(path)
+            # In a process of its own, which Ctrl-C ends, and which ends itself where options are wrong.
+            command = [sys.executable, "-m", "tetralod", "html", source, f"--output={target}", *words]
+            done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
+            said = done.stderr.strip()
+            if done.returncode != 0:
+                raise TetralodError("bad-option" if done.returncode == 2 else "bad-source", said.removeprefix("error: "))
+            for line in said.splitlines():
+                if line.startswith("warning: "):
+                    warnings.warn(line.removeprefix("warning: "), stacklevel=2)
+            return Path(target).read_text(encoding="utf-8") if path is None else None
+
     def _open(self) -> _native.Mt:
         if self._native is None:
             raise TetralodError("not-ready", f"{self._name} has been closed")
@@ -258,6 +290,20 @@ class Mt:
             _arrays=arrays,
             _native=native,
         )
+
+
+def _words(name: str, value: object) -> list[str]:
+    """An option of the command and its value, as words."""
+    if value is None or value is False:
+        return []
+    option = f"--{name.rstrip('_').replace('_', '-')}"
+    if value is True:
+        return [option]
+    if isinstance(value, tuple):
+        return [f"{option}={','.join(map(str, value))}"]
+    if isinstance(value, (list, np.ndarray)):
+        return [word for one in value for word in _words(name, one)]
+    return [f"{option}={os.fspath(value) if isinstance(value, os.PathLike) else value}"]
 
 
 def _need(info: Info, given: Mapping[str, Any], shown: Field) -> list[tuple[dict[str, Any], float]]:

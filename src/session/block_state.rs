@@ -31,6 +31,10 @@ pub(super) struct Blocks {
     pub plan: Vec<(f64, u32)>,
     pub needed: u32,
     pub left_out: u32,
+    /// Blocks that are needed and that the source does not have.
+    pub absent: u32,
+    /// The bytes that the source has, where those are a part of the file.
+    pub held: Option<RangeSet>,
     /// The number of the plan in which each block was needed last.
     pub last_needed: Vec<u32>,
     pub plans: u32,
@@ -48,6 +52,17 @@ impl Blocks {
     /// No blocks yet, which may take so many bytes in memory.
     pub fn new(memory: u64) -> Self {
         Self { in_parts: true, memory, ..Self::default() }
+    }
+
+    /// Whether the source has these bytes.
+    pub fn can_come(&self, ranges: &[Range<u64>]) -> bool {
+        self.held.as_ref().is_none_or(|held| ranges.iter().all(|range| held.contains(range)))
+    }
+
+    /// As much of the beginning of a range as the source has.
+    pub fn within_held(&self, range: Range<u64>) -> Option<Range<u64>> {
+        let Some(held) = &self.held else { return Some(range) };
+        held.first_in(&range).filter(|part| part.start == range.start)
     }
 
     /// Notes that so many bytes have come from `start` on.

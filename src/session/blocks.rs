@@ -10,7 +10,7 @@ use crate::format::{BlockInfo, DecodeOptions, Decoder, ErrorBytes, FormatError, 
 use crate::geom::Bounds;
 use crate::mt::{ErrorCode, Mt, MtInfo, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{BlockData, Budget, Criterion, Front};
-use crate::stream::{Loader, WantedRange};
+use crate::stream::{Loader, RangeSet, WantedRange};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -25,6 +25,8 @@ pub struct BlockProgress {
     pub needed: u32,
     /// Blocks of those that are not to be fetched because there is no memory for them.
     pub left_out: u32,
+    /// Blocks of those that cannot come, since the source has a part of the file without them.
+    pub absent: u32,
     /// Bytes in memory of the blocks that are here, and of what waits to be put together.
     pub bytes: u64,
     /// Blocks that meshes needed although the index says that they cannot: always 0, unless the file or the planner is wrong.
@@ -69,6 +71,36 @@ impl Session {
         Self { decoder, blocks: Blocks::new(memory), ..Self::default() }
     }
 
+    /// Says that the source has these bytes of the file and no others: no other is wanted from now on. The mesh is as good as they allow;
+    /// [`BlockProgress::absent`] counts the blocks that it lacks. Only for sessions [in parts](Session::in_parts).
+    pub fn hold(&mut self, held: RangeSet) {
+        self.blocks.held = Some(held);
+    }
+
+    /// The bytes of the file that give the mesh of the request again, or one that is as good as so many bytes of blocks allow: what stands in
+    /// front of the blocks, and of the blocks that were needed those with the largest errors. Of a file without blocks, all that has come.
+    pub fn needed_bytes(&self, most: u64) -> RangeSet {
+        let blocks = &self.blocks;
+        let is_paged = self.decoder.mt().is_some_and(Mt::is_paged);
+        let index = self.decoder.index().filter(|_| is_paged);
+        let (Some(head), Some(index)) = (self.decoder.head_end(), index) else {
+            return blocks.arrived.clone();
+        };
+        let fields = self.decoder.wanted_fields();
+        let was_needed = |&block: &u32| blocks.last_needed.get(block as usize).is_some_and(|&plan| plan > 0);
+        let mut needed: Vec<u32> = (0..index.blocks.len() as u32).filter(was_needed).collect();
+        // All with larger errors come first, so that what there is has one bound.
+        needed.sort_by_key(|&block| std::cmp::Reverse(errors_of(index, fields, block).into_iter().max()));
+        let mut room = most;
+        let ranges = needed.into_iter().map(|block| self.decoder.block_ranges(block)).take_while(|ranges| {
+            let bytes = ranges.iter().map(|range| range.end - range.start).sum();
+            let fits = bytes <= room;
+            room = room.saturating_sub(bytes);
+            fits
+        });
+        RangeSet::of(ranges.flatten().chain([0..head]).collect())
+    }
+
     /// Which bytes of the file are wanted next, most important first: the more a block lowers the excess of the error for each of
     /// its bytes. They may reach beyond the end of the file. None when all is here that the request needs. Only for sessions
     /// [in parts](Session::in_parts).
@@ -78,7 +110,8 @@ impl Session {
             return Vec::new();
         }
         if let Some(end) = self.head_missing() {
-            return vec![WantedRange { range: blocks.fed..end, priority: f32::INFINITY }];
+            let held = blocks.within_held(blocks.fed..end);
+            return held.map(|range| WantedRange { range, priority: f32::INFINITY }).into_iter().collect();
         }
         let Some(mt) = self.decoder.mt().filter(|mt| mt.is_paged()) else { return Vec::new() };
         let mut wanted = Vec::new();
@@ -276,6 +309,7 @@ impl Session {
             here: (0..count).filter(|&block| mt.has_page(block)).count() as u32,
             needed: blocks.needed,
             left_out: blocks.left_out + without_memory,
+            absent: blocks.absent,
             bytes: blocks.bytes_beside() + mt.page_bytes(),
             missed: blocks.missed,
         }
@@ -349,7 +383,10 @@ impl Session {
         let fields = self.decoder.wanted_fields();
         let is_exhaustive = by_index.is_some() && blocks.budget.is_unlimited();
         let mut plan = by_index.unwrap_or_default();
-        if mesh_has_moved && plan.iter().all(|&(_, block)| mt.has_page(block)) {
+        let decoder = &self.decoder;
+        let can_come =
+            |held: &Blocks, block| mt.has_page(block) || held.can_come(&decoder.block_ranges(block));
+        if mesh_has_moved && plan.iter().all(|&(_, block)| mt.has_page(block) || !can_come(blocks, block)) {
             let mut is_planned = vec![false; index.blocks.len()];
             plan.iter().for_each(|&(_, block)| is_planned[block as usize] = true);
             let asked = plan_by_mesh(front, mt, &**criterion, &blocks.budget, index, fields);
@@ -365,6 +402,9 @@ impl Session {
             other.total_cmp(priority).then(block.cmp(after))
         });
         blocks.needed = plan.len() as u32;
+        plan.retain(|&(_, block)| can_come(blocks, block));
+        let possible = plan.len() as u32;
+        blocks.absent = blocks.needed - possible;
         // Pages with applied updates do not go: what comes has to fit beside them.
         let mut taken: u64 = (0..index.blocks.len() as u32)
             .filter(|&block| mt.has_page(block) && is_in_use(front, index, mt, block))
@@ -375,13 +415,12 @@ impl Session {
             taken += mt.bytes_of_page(block);
             taken <= memory
         });
-        blocks.left_out = blocks.needed - plan.len() as u32;
+        blocks.left_out = possible - plan.len() as u32;
         blocks.plan = plan;
         let mut planned = vec![false; index.blocks.len()];
         blocks.plan.iter().for_each(|&(_, block)| planned[block as usize] = true);
         let is_planned = |block: u32| planned[block as usize];
         blocks.waiting.retain(|&block, _| is_planned(block));
-        let decoder = &self.decoder;
         blocks.pieces.retain(|&start, _| decoder.block_at(start).is_some_and(is_planned));
     }
 

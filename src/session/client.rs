@@ -48,7 +48,11 @@ impl<S: RangeSource> Client<S> {
     /// # Errors
     /// If the bytes do not come, or are not those of an MT file.
     pub fn open(source: S, options: DecodeOptions, memory: u64) -> Result<Self, ClientError> {
-        let mut client = Self { source, session: Session::in_parts(options, memory), asked: Vec::new() };
+        let mut session = Session::in_parts(options, memory);
+        if let Some(held) = source.held() {
+            session.hold(held.clone());
+        }
+        let mut client = Self { source, session, asked: Vec::new() };
         while client.session.mesh().is_none() && !client.fetch(PATIENCE)? {}
         if client.session.mesh().is_none() {
             client.session.finish()?;

@@ -18,9 +18,9 @@ pub use error::StreamError;
 pub use http::{CacheFolder, HttpOptions, HttpSource};
 #[doc(hidden)]
 pub use loader::{Action, Failure, Loader, LoaderOptions, Traffic, WantedRange};
-pub(crate) use range_set::RangeSet;
+pub use range_set::RangeSet;
 #[doc(hidden)]
 pub use response::ResponseHead;
 #[doc(hidden)]
 pub use source::Arrived;
-pub use source::{FileSource, RangeSource};
+pub use source::{FileSource, PartSource, RangeSource};

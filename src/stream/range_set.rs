@@ -57,6 +57,11 @@ impl RangeSet {
         self.ranges.splice(from..to, [before, after].into_iter().filter(|rest| rest.start < rest.end));
     }
 
+    /// Whether all bytes of `range` are in it.
+    pub fn contains(&self, range: &Range<u64>) -> bool {
+        range.start >= range.end || self.first_in(range).as_ref() == Some(range)
+    }
+
     /// The first run of bytes that are in the set and in `range`.
     pub fn first_in(&self, range: &Range<u64>) -> Option<Range<u64>> {
         let found = self.ranges.get(self.ranges.partition_point(|found| found.end <= range.start))?;
@@ -111,6 +116,7 @@ mod tests {
                     let left: Vec<u64> = expected.iter().copied().filter(|x| !c.contains(x)).collect();
                     assert_eq!(members(&less), left, "{both:?} without {c:?}");
                     let inside: Vec<u64> = expected.iter().copied().filter(|x| c.contains(x)).collect();
+                    assert_eq!(both.contains(c), inside.len() == c.clone().count());
                     let first = both.first_in(c);
                     assert_eq!(first.as_ref().map(|run| run.start), inside.first().copied());
                     assert!(first.is_none_or(

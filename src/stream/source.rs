@@ -2,6 +2,7 @@
 
 use super::error::StreamError;
 use super::loader::{Traffic, WantedRange};
+use super::range_set::RangeSet;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::time::Duration;
@@ -19,6 +20,11 @@ pub trait RangeSource {
 
     /// The size of the whole, once it is known.
     fn total(&self) -> Option<u64>;
+
+    /// The bytes that it has, if those are a part of the whole.
+    fn held(&self) -> Option<&RangeSet> {
+        None
+    }
 
     /// What has been asked and has come over a network, if that is where the bytes are.
     fn traffic(&self) -> Option<Traffic> {
@@ -50,6 +56,78 @@ impl<R: Read + Seek> FileSource<R> {
         self.reader.by_ref().take(length).read_to_end(&mut bytes).map_err(unreadable)?;
         // What was there when it was opened is gone: the file is being written to.
         if (bytes.len() as u64) < length { Err(StreamError::Changed) } else { Ok(bytes) }
+    }
+}
+
+/// A part of a file: some of its bytes, in memory.
+#[derive(Clone, Debug)]
+pub struct PartSource {
+    held: RangeSet,
+    /// Those of all ranges, one behind the other.
+    bytes: Vec<u8>,
+    total: u64,
+    wanted: Vec<WantedRange>,
+}
+
+impl PartSource {
+    /// These bytes of a file of `total` bytes, as `source` gives them.
+    ///
+    /// # Errors
+    /// If they do not come.
+    pub fn read(source: &mut impl RangeSource, held: &RangeSet, total: u64) -> Result<Self, StreamError> {
+        let mut bytes = Vec::new();
+        for range in held.iter() {
+            source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
+            let part = loop {
+                if let Some((_, part)) = source.next(Duration::from_secs(1))? {
+                    break part;
+                }
+            };
+            if part.len() as u64 != range.end - range.start {
+                return Err(StreamError::Changed);
+            }
+            bytes.extend(part);
+        }
+        Ok(Self { held: held.clone(), bytes, total, wanted: Vec::new() })
+    }
+
+    /// The bytes of all ranges, one behind the other.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// As much of the beginning of `range` as is there.
+    fn part(&self, range: &Range<u64>) -> Vec<u8> {
+        let mut before = 0;
+        for held in self.held.iter() {
+            if held.contains(&range.start) {
+                let at = before + (range.start - held.start);
+                let end = at + (range.end.min(held.end) - range.start);
+                return self.bytes[at as usize..end as usize].to_vec();
+            }
+            before += held.end - held.start;
+        }
+        Vec::new()
+    }
+}
+
+impl RangeSource for PartSource {
+    fn want(&mut self, wanted: &[WantedRange]) {
+        self.wanted = wanted.to_vec();
+    }
+
+    fn next(&mut self, _patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        let Some(WantedRange { range, .. }) = self.wanted.pop() else { return Ok(None) };
+        let bytes = self.part(&range);
+        Ok(Some((range, bytes)))
+    }
+
+    fn total(&self) -> Option<u64> {
+        Some(self.total)
+    }
+
+    fn held(&self) -> Option<&RangeSet> {
+        Some(&self.held)
     }
 }
 

@@ -43,7 +43,7 @@ const ELSEWHERE = {
     "sh: the commands that run all tests and make wheels; `release` of xtask compiles the command with the page, cli/tests/command/view.rs views; containers need an engine, `release` lints what builds them",
   ],
   "docs/README.md": ["sh: cli/tests/command/view.rs views"],
-  "docs/command.md": ["sh: `release` of xtask compiles the command with the page, and writes completions"],
+  "docs/command.md": ["sh: `release` of xtask compiles the command with the page; cli/tests/command/html.rs makes pages"],
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
   "docs/hosting.md": ["sh: needs an account of S3"],
@@ -51,6 +51,7 @@ const ELSEWHERE = {
   "docs/howto/deformed.md": ["sh: the commands of movies.md are run"],
   "docs/howto/movies.md": ["sh: needs ffmpeg"],
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
+  "docs/howto/one-file.md": ["sh: cli/tests/command/html.rs and html-browser.test.js make such pages; the command here is without the viewer"],
   "docs/howto/python.md": ["python: python/tests/test_pages.py"],
 };
 

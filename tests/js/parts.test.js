@@ -30,6 +30,38 @@ const REQUESTS = [
 /** Blocks of this file are much smaller than those of others, and servers near by. */
 const QUICK = { retries: 3, backoffMs: 5, timeoutMs: 2000, gap: 256 };
 
+/** Start and end of all bytes but the last third, which a part of the file does not have, with a gap. */
+function partOf(whole) {
+  const [first, second] = [Math.floor(whole.length / 2), Math.floor((2 * whole.length) / 3)];
+  const ranges = [0, first, first + 9, second];
+  const read = (start, end) => {
+    assert.ok(end <= first || (start >= first + 9 && end <= second), `${start} to ${end} is not there`);
+    return whole.subarray(start, end);
+  };
+  return { name: "some.mt", size: whole.length, read, ranges };
+}
+
+test("a part of a file gives the meshes that it has the blocks of, and says which it lacks", async () => {
+  const whole = await MultiTessellation.open(blocks["half-edge"], { worker: false });
+  await whole.complete;
+  for (const worker of [false, true]) {
+    const mt = await MultiTessellation.open(partOf(blocks["half-edge"]), { worker });
+    const coarse = await mt.refine({ error: "20%" });
+    await whole.refine({ error: "20%" });
+    assert.equal(await mt.hash(), await whole.hash());
+    assert.deepEqual([coarse.stats.satisfied, coarse.stats.limitedBy, mt.progress.blocks?.absent], [true, "error", 0]);
+    const fine = await mt.refine({ error: 0 });
+    assert.deepEqual([fine.stats.satisfied, fine.stats.limitedBy, fine.stats.missing], [false, "part", false]);
+    assert.ok(mt.progress.blocks?.absent && fine.stats.tetrahedra > coarse.stats.tetrahedra);
+    await mt.refine({ error: "20%" });
+    assert.equal(await mt.hash(), await whole.hash());
+    const view = await mt.view();
+    assert.equal((await view.refine({ error: 0 })).stats.limitedBy, "part");
+    mt.free();
+  }
+  whole.free();
+});
+
 let server;
 let base;
 /** What answers now, and what it has been asked and has sent. */

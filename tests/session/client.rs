@@ -11,7 +11,8 @@ use tetralod::mt::{MtKind, MultiTessellation, UpdatePages};
 use tetralod::refine::{Need, Request};
 use tetralod::session::{Client, ClientError, Session};
 use tetralod::stream::{
-    Action, Arrived, FileSource, Loader, LoaderOptions, RangeSource, ResponseHead, StreamError, WantedRange,
+    Action, Arrived, FileSource, Loader, LoaderOptions, PartSource, RangeSource, ResponseHead, StreamError,
+    WantedRange,
 };
 use tetralod_build::{BuildConfig, Construction, build};
 use tetralod_io::generate;
@@ -265,4 +266,59 @@ fn without_io_it_is_the_same_machine() {
         });
         assert!(matches!(found, Err(FormatError::Truncated { .. })), "{end}: {found:?}");
     }
+}
+
+/// A client of a part of a file.
+fn client_of_part(file: &[u8], whole: &Client<Counted>, most: u64) -> Client<PartSource> {
+    let needed = whole.session().needed_bytes(most);
+    let part = PartSource::read(&mut Counted::new(file).0, &needed, file.len() as u64).expect("it is there");
+    assert_eq!(part.bytes().len() as u64, needed.len());
+    Client::open(part, DecodeOptions::default(), u64::MAX).expect("a sound file")
+}
+
+#[test]
+fn a_part_of_a_file_gives_the_mesh_that_it_was_cut_for_and_says_what_it_lacks() {
+    for kind in MtKind::ALL {
+        let file = file(kind);
+        for request in requests() {
+            let (source, _) = Counted::new(&file);
+            let mut whole = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
+            let stats = whole.refine(&request).expect("a good request");
+            let mut part = client_of_part(&file, &whole, u64::MAX);
+            let mut check = || {
+                let again = part.refine(&request).expect("a good request");
+                assert_eq!(part.session().hash(), whole.session().hash(), "{kind:?} {request:?}");
+                assert_eq!((again.satisfied, again.error_bound), (true, stats.error_bound));
+                assert_eq!(part.session().block_progress().absent, 0);
+                // What is not there is no reason to wait.
+                let finest = part.refine(&Request::within(0.0)).expect("a good request");
+                assert!(!finest.missing && !part.session().is_waiting());
+                assert!(finest.tetrahedra >= again.tetrahedra);
+                assert_eq!(finest.satisfied, part.session().block_progress().absent == 0);
+            };
+            check();
+            check();
+        }
+    }
+}
+
+#[test]
+fn a_smaller_part_has_the_blocks_with_the_largest_errors() {
+    let file = file(MtKind::HalfEdge);
+    let (source, _) = Counted::new(&file);
+    let mut whole = Client::open(source, DecodeOptions::default(), u64::MAX).expect("a sound file");
+    let full = whole.refine(&Request::within(0.0)).expect("a good request");
+    let head = whole.session().needed_bytes(0).len();
+    let all = whole.session().needed_bytes(u64::MAX).len() - head;
+    let mut last = (0, f64::INFINITY);
+    for part in [0, all / 8, all / 4, all / 2, all] {
+        assert!(whole.session().needed_bytes(part).len() <= head + part);
+        let mut client = client_of_part(&file, &whole, part);
+        let stats = client.refine(&Request::within(0.0)).expect("a good request");
+        assert!(stats.tetrahedra > last.0 && stats.error_bound <= last.1, "{part} of {all}: {stats:?}");
+        let again = client.refine(&Request::within(1.01 * stats.error_bound)).expect("a good request");
+        assert!(again.satisfied, "{part} of {all}");
+        last = (stats.tetrahedra, stats.error_bound);
+    }
+    assert_eq!(last, (full.tetrahedra, full.error_bound));
 }

@@ -1,6 +1,6 @@
 /**
- * In place of `files.js` in `tetralod/inline`: the wasm modules and the worker are in the bundle. `inline.mjs` gives the content
- * of the two imports.
+ * In place of `files.js` in `tetralod/inline`, and of `viewer-files.js` in `tetralod/inline-viewer`: the wasm module and the worker are in
+ * the bundle. `inline.mjs` gives the content of the two imports, and the names that the package has for these.
  */
 
 import packed from "embedded:wasm";
@@ -12,7 +12,7 @@ let bytes;
 let url;
 
 /** The bytes of the wasm module. */
-export const coreWasm = () => (bytes ??= unpacked(packed));
+export const wasm = () => (bytes ??= unpacked(packed));
 
 async function unpacked(packed) {
   const stream = new Blob([Uint8Array.from(atob(packed), (c) => c.charCodeAt(0))]).stream();
@@ -20,14 +20,11 @@ async function unpacked(packed) {
 }
 
 /** Starts the worker from its text: in a page from a blob. */
-export function startCore() {
+export function start() {
   const node = globalThis.process?.getBuiltinModule?.("node:worker_threads");
   if (node) return new node.Worker(script, { eval: true });
   url ??= URL.createObjectURL(new Blob([script], { type: "text/javascript" }));
   return new Worker(url);
 }
 
-export const coreScript = () => undefined;
-
-/** What else helps when it does not start. */
-export const coreRemedy = ", allow blob: in worker-src, or open with `worker: false`";
+export const place = () => undefined;

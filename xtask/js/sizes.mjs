@@ -24,6 +24,7 @@ const LIMITS = {
   "./vtk": 2_500,
   "./build": 4_000,
   "./inline": 416_000,
+  "./inline-viewer": 690_000,
   "./worker": 10_800,
   "./viewer-worker": 29_600,
   "./build-worker": 5_500,

@@ -1,5 +1,6 @@
 //! `cargo xtask build`: the three wasm modules, and the scripts and declarations that TypeScript makes of `pkg-template/`, merged into
-//! `pkg/`, with `inline.js`, which `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
+//! `pkg/`, with `inline.js` and `inline-viewer.js`, which `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each
+//! entry.
 //!
 //! The core (decoder, refinement, and the tools for meshes), the viewer (the same with the renderer) and the builder are separate
 //! modules, so that a page which draws by its own means does not download a renderer, and one that shows files no builder.
@@ -124,15 +125,17 @@ pub fn build_viewer() -> Result<()> {
     build_some(&[&VIEWER])
 }
 
-/// Puts some modules into `pkg/`, and all scripts but `inline.js`. The scripts are not checked: types of other modules may be missing.
+/// Puts some modules into `pkg/`, and all scripts but those of one file. The scripts are not checked: types of other modules may be missing.
 fn build_some(modules: &[&Module]) -> Result<()> {
     prepare()?;
     let staging = Path::new("target/pkg-part");
     remake(staging)?;
     compile_all(modules.iter().copied(), Profile::Released, staging)?;
     compile_scripts(staging, &["--noCheck"])?;
-    // That one is made of all the modules.
-    fs::remove_file(staging.join("inline.js")).context("inline.js")?;
+    // These are made of all the modules.
+    for inline in ["inline.js", "inline-viewer.js"] {
+        fs::remove_file(staging.join(inline)).context(inline)?;
+    }
     move_files(staging, Path::new(PKG))
 }
 
@@ -146,7 +149,7 @@ fn prepare() -> Result<()> {
 pub fn ensure_built(profile: Profile) -> Result<()> {
     let made = fs::read_to_string(MADE).unwrap_or_default();
     // The scripts are made last.
-    let is_there = Path::new(PKG).join("inline.js").is_file();
+    let is_there = Path::new(PKG).join("inline-viewer.js").is_file();
     if is_there && [Profile::Released, profile].iter().any(|good| made == good.cargo()[0]) {
         return shell::install_node_tools();
     }

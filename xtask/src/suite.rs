@@ -388,9 +388,10 @@ fn e2e() -> Result<()> {
     let server = demo::start_server(&tetralod, 0)?;
     with_fixture(|| {
         let test = |name: &str, variable: &str, path: &Path| {
-            shell::run(fixture_env(node_test(&format!("{name}-browser.test.js")).env(variable, path)))
+            let mut command = node_test(&format!("{name}-browser.test.js"));
+            shell::run(fixture_env(command.env("TETRALOD", &tetralod).env(variable, path)))
         };
-        for name in ["core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "build"] {
+        for name in ["core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "html", "build"] {
             test(name, "CHROMIUM", &browser.chromium)?;
         }
         let firefox = browser::firefox()?;

@@ -2,7 +2,7 @@
 //! reads, an MT file is built and kept. What changes is shown anew.
 
 mod cache;
-mod page;
+pub mod page;
 mod volumes;
 
 use self::cache::Cache;

@@ -1,10 +1,12 @@
 //! The page and the npm package: inside of this program, or in a folder.
 
 use crate::serve;
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use axum::Router;
 use axum::http::{StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
+use std::borrow::Cow;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files by their paths; none where the program was compiled without them.
@@ -31,6 +33,22 @@ impl Page {
                  `cargo install --path cli --features page` make one"
             ),
             None => Ok(Self::Inside),
+        }
+    }
+
+    /// A file of it.
+    pub fn read(&self, path: &str) -> Result<Cow<'static, [u8]>> {
+        match self {
+            Self::Inside => {
+                let found = inside::FILES.iter().find(|(name, _)| *name == path);
+                let (_, bytes) =
+                    found.with_context(|| format!("this program was compiled without {path}"))?;
+                Ok(Cow::Borrowed(bytes))
+            }
+            Self::Folder(folder) => {
+                let path = folder.join(path);
+                Ok(Cow::Owned(fs::read(&path).with_context(|| path.display().to_string())?))
+            }
         }
     }
 

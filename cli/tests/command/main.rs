@@ -7,6 +7,7 @@ mod deform;
 mod fields;
 mod gallery;
 mod generate;
+mod html;
 mod linking;
 mod npz;
 mod parts;

@@ -45,7 +45,10 @@ impl File {
     /// A file that `loader` brings in parts, whose blocks may take so many bytes of memory.
     pub fn in_parts(fields: Vec<String>, memory: f64, loader: &RangeLoader) -> Self {
         let options = DecodeOptions { fields, ..DecodeOptions::default() };
-        let session = Session::in_parts(options, memory as u64);
+        let mut session = Session::in_parts(options, memory as u64);
+        if let Some(held) = loader.held() {
+            session.hold(held.clone());
+        }
         Self { session, loader: Some(loader.share()), ..Self::default() }
     }
 

@@ -5,7 +5,9 @@ use js_sys::{Array, Uint8Array};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
-use tetralod::stream::{Action, Failure, Loader, LoaderOptions, ResponseHead, Traffic, WantedRange};
+use tetralod::stream::{
+    Action, Failure, Loader, LoaderOptions, RangeSet, ResponseHead, Traffic, WantedRange,
+};
 use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -27,12 +29,19 @@ pub type SharedLoader = Rc<RefCell<Loader>>;
 #[wasm_bindgen]
 pub struct RangeLoader {
     loader: SharedLoader,
+    /// The bytes that can be had, if those are a part of the file.
+    held: Option<RangeSet>,
 }
 
 impl RangeLoader {
     /// The same loader, for the file that takes what it brings.
     pub(crate) fn share(&self) -> SharedLoader {
         Rc::clone(&self.loader)
+    }
+
+    /// The bytes that can be had, if those are a part of the file.
+    pub(crate) fn held(&self) -> Option<&RangeSet> {
+        self.held.as_ref()
     }
 }
 
@@ -61,7 +70,14 @@ impl RangeLoader {
             seed: seed.to_bits(),
             ..default
         });
-        Self { loader: Rc::new(RefCell::new(loader)) }
+        Self { loader: Rc::new(RefCell::new(loader)), held: None }
+    }
+
+    /// Says, before a file is opened with it, that no other bytes can be had: start and end of each range.
+    pub fn hold(&mut self, pairs: &[f64]) {
+        let (ranges, _) = pairs.as_chunks::<2>();
+        let ranges = ranges.iter().map(|&[start, end]| start as u64..end as u64);
+        self.held = Some(RangeSet::of(ranges.collect()));
     }
 
     /// Asks for more or less at a time from now on.

@@ -51,10 +51,11 @@ pub fn progress(progress: &Progress) -> JsProgress {
 
 /// How the blocks stand, for JavaScript.
 pub fn blocks(progress: &BlockProgress) -> JsBlocks {
-    let BlockProgress { blocks, here, needed, left_out, bytes, missed } = *progress;
-    let [all, here, needed, left_out, missed] = [blocks, here, needed, left_out, missed].map(f64::from);
-    let names = ["all", "here", "needed", "leftOut", "bytes", "missed"];
-    record(&names, &[all, here, needed, left_out, bytes as f64, missed])
+    let BlockProgress { blocks, here, needed, left_out, absent, bytes, missed } = *progress;
+    let [all, here, needed, left_out, absent, missed] =
+        [blocks, here, needed, left_out, absent, missed].map(f64::from);
+    let names = ["all", "here", "needed", "leftOut", "absent", "bytes", "missed"];
+    record(&names, &[all, here, needed, left_out, absent, bytes as f64, missed])
 }
 
 /// What is known of the MT of a session, for JavaScript.

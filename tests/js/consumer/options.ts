@@ -219,6 +219,7 @@ export const blocks: Members<BlockProgress> = {
   here: "number",
   needed: "number",
   leftOut: "number",
+  absent: "number",
   bytes: "number",
   missed: "number",
 };
