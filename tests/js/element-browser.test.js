@@ -203,7 +203,14 @@ test("a reader is asked for ranges, and `request` goes before the attributes", a
   const few = await rested();
   assert.ok(few > 100 && few <= 900, `${few} tetrahedra`);
   await page.evaluate(() => (document.querySelector("tetralod-viewer").request = null));
-  await page.waitForFunction((few) => document.querySelector("tetralod-viewer").viewer.mesh().then(({ tets }) => tets.length > 4 * few), few);
+  await page.waitForFunction(
+    (few) =>
+      document
+        .querySelector("tetralod-viewer")
+        .viewer.mesh()
+        .then(({ tets }) => tets.length > 4 * few),
+    few,
+  );
   assert.deepEqual(complaints, []);
   await page.close();
 });
