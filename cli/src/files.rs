@@ -61,12 +61,12 @@ pub fn note_inputs(files: &[PathBuf]) {
     inputs().extend(files.iter().filter_map(|file| fs::canonicalize(file).ok()));
 }
 
-/// All inputs that were read.
-pub fn read_inputs() -> Vec<PathBuf> {
+/// All inputs that were read. What is no UTF-8 in a path, which JSON cannot say, is `U+FFFD` there.
+pub fn read_inputs() -> Vec<String> {
     let mut all = inputs().clone();
     all.sort_unstable();
     all.dedup();
-    all
+    all.iter().map(|path| path.to_string_lossy().into_owned()).collect()
 }
 
 /// Refuses an output that is one of the inputs, or that has no place, before any work is done for it.

@@ -78,6 +78,8 @@ struct Report {
     repaired: String,
     repair: Option<Repair>,
     averaged: Vec<AveragedField>,
+    /// The files that were read, at their places without links; none of what is in memory.
+    inputs: Vec<String>,
     notes: Vec<String>,
 }
 
@@ -110,6 +112,10 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
     let (config, level) = (options.config()?, options.level()?);
     let (name, mesh) = input.read(&options, &config, watch)?;
     let notes = mesh.notes.clone();
+    let mut inputs: Vec<PathBuf> =
+        mesh.input.files.0.iter().filter_map(|file| std::fs::canonicalize(file).ok()).collect();
+    inputs.sort_unstable();
+    inputs.dedup();
     watch.begin("repair")?;
     let bad_mesh = |error: MeshError| Failure::new("bad-mesh", format!("{name}: {error}"));
     let (mut mesh, repaired, repair) = if mesh.tets.is_empty() {
@@ -151,6 +157,7 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
         repaired,
         repair,
         averaged,
+        inputs: inputs.iter().map(|path| path.to_string_lossy().into_owned()).collect(),
         notes,
     };
     let report =

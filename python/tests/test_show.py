@@ -104,6 +104,7 @@ def test_what_is_set_goes_to_the_page_in_its_words(ball, show):
     refused("bad-option", "`eror`: there is none of this name", setattr, widget, "request", {"eror": 1})
     refused("bad-option", "`max_tets`", setattr, widget, "request", {"needs": [{"max_tets": 1}]})
     refused("bad-option", "pressure", setattr, widget, "request", {"field": "pressure"})
+    refused("bad-option", "`view`: must be a mapping", setattr, widget, "request", {"view": "front"})
     assert "view" in widget.request, "what is refused changes nothing"
 
 

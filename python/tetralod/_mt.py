@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Union
 
@@ -27,6 +27,7 @@ Tolerance = Union[float, str]
 """A number in units of the field, or a percentage of its range such as ``"1%"``."""
 
 _SHAPES = ("box", "sphere", "oriented_box", "half_space", "slab", "planes")
+NEED = ("error", "field", "time", *_SHAPES, "isovalues", "ranges", "regions", "view", "transfer")
 
 
 def open(
@@ -306,12 +307,20 @@ def _words(name: str, value: object) -> list[str]:
     return [f"{option}={os.fspath(value) if isinstance(value, os.PathLike) else value}"]
 
 
-def _need(info: Info, given: Mapping[str, Any], shown: Field) -> list[tuple[dict[str, Any], float]]:
-    """The needs of these options, each with what its bound is multiplied by to be in the unit in which it was asked."""
-    known = ("error", "field", "time", *_SHAPES, "isovalues", "ranges", "regions", "view", "transfer")
+def check_names(given: Iterable[str], known: Sequence[str]) -> None:
     for name in given:
         if name not in known:
             raise bad_option(name, f"there is none of this name, only {', '.join(known)}")
+
+
+def by_columns(matrix: np.ndarray) -> np.ndarray:
+    """Mathematics writes matrices row by row, graphics column by column."""
+    return (matrix.T if matrix.shape == (4, 4) else matrix).ravel()
+
+
+def _need(info: Info, given: Mapping[str, Any], shown: Field) -> list[tuple[dict[str, Any], float]]:
+    """The needs of these options, each with what its bound is multiplied by to be in the unit in which it was asked."""
+    check_names(given, NEED)
     options = {name: value for name, value in given.items() if value is not None}
     own = shown
     if "field" in options or "time" in options:
@@ -359,10 +368,8 @@ def _need(info: Info, given: Mapping[str, Any], shown: Field) -> list[tuple[dict
 
 def _view(need: dict[str, Any], given: Any, own: Field) -> list[tuple[dict[str, Any], float]]:
     view = _members("view", given, ("matrix", "viewport", "pixels"), ("outside",))
-    matrix = np.asarray(view["matrix"], dtype=float)
-    # Mathematics writes matrices row by row, graphics column by column.
-    columns = matrix.T if matrix.shape == (4, 4) else matrix
-    flat = _options.numbers("view.matrix", columns.ravel(), (16,), "an array (4, 4), or 16 numbers column by column")
+    columns = by_columns(np.asarray(view["matrix"], dtype=float))
+    flat = _options.numbers("view.matrix", columns, (16,), "an array (4, 4), or 16 numbers column by column")
     viewport = _options.numbers("view.viewport", view["viewport"], (2,), "two numbers")
     seen = {**need, "error": _options.amount("view.pixels", view["pixels"]), "view": (flat.tolist(), viewport.tolist())}
     if view.get("outside") is None:

@@ -19,12 +19,9 @@ import traitlets
 from . import _native
 from ._errors import TetralodError, bad_option
 from ._info import Info
-from ._mt import Mt
+from ._mt import NEED, Mt, by_columns, check_names
 
-_NEED = (
-    "error", "field", "time", "box", "sphere", "oriented_box", "half_space", "slab", "planes", "isovalues", "ranges", "regions", "view", "transfer",
-)  # fmt: skip
-_REQUEST = (*_NEED, "needs", "max_tets", "max_vertices", "max_bytes")
+_REQUEST = (*NEED, "needs", "max_tets", "max_vertices", "max_bytes")
 
 _DEFAULT = {"view": {"pixels": 1, "outside": "10%"}, "max_tets": 500_000}
 
@@ -91,9 +88,9 @@ class Viewer(anywidget.AnyWidget):
     @traitlets.validate("request")
     def _check_request(self, proposal: dict[str, Any]) -> dict[str, Any]:
         request: dict[str, Any] = _plain(proposal["value"])
-        _known(request, _REQUEST)
-        for need in request.get("needs", ()):
-            _known(need, _NEED)
+        check_names(request, _REQUEST)
+        for need in request.get("needs") or ():
+            check_names(need, NEED)
         _sent(request, self.mt.info)
         return request
 
@@ -171,12 +168,6 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
-def _known(request: Mapping[str, Any], names: tuple[str, ...]) -> None:
-    for name in request:
-        if name not in names:
-            raise bad_option(name, f"there is none of this name, only {', '.join(names)}")
-
-
 def _sent(request: Mapping[str, Any], info: Info) -> Any:
     """A request in the words of the page."""
     sent = {name: value for name, value in request.items() if name != "time" and value is not None}
@@ -187,10 +178,10 @@ def _sent(request: Mapping[str, Any], info: Info) -> Any:
         sent["needs"] = [_sent(need, info) for need in sent["needs"]]
     if isinstance(sent.get("isovalues"), (int, float)):
         sent["isovalues"] = [sent["isovalues"]]
-    matrix = sent.get("view", {}).get("matrix")
-    if matrix is not None and np.shape(matrix) == (4, 4):
-        # Mathematics writes matrices row by row, graphics column by column.
-        sent["view"] = {**sent["view"], "matrix": np.transpose(matrix).ravel().tolist()}
+    if not isinstance(sent.get("view", {}), Mapping):
+        raise bad_option("view", "must be a mapping")
+    if sent.get("view", {}).get("matrix") is not None:
+        sent["view"] = {**sent["view"], "matrix": by_columns(np.asarray(sent["view"]["matrix"])).tolist()}
     return _camel(sent)
 
 

@@ -422,7 +422,7 @@ test("the pointer reads values, clicks keep probes, and two of them give a plot"
   // A drag with Alt makes a box of what is at its ends.
   await page.selectOption("#region", "");
   await page.keyboard.down("Alt");
-  await page.mouse.move(...at(0.45, 0.45));
+  await page.mouse.move(...at(0.4, 0.42));
   await page.mouse.down();
   await page.mouse.move(...at(0.55, 0.55), { steps: 3 });
   await page.mouse.up();

@@ -190,19 +190,32 @@ test("a reader is asked for ranges, and `request` goes before the attributes", a
     const element = document.querySelector("tetralod-viewer");
     const bytes = new Uint8Array(await (await fetch("model.mt")).arrayBuffer());
     const asked = [];
-    const read = (start, end) => (asked.push(end), bytes.subarray(start, end));
+    const read = (start, end) => {
+      asked.push(end);
+      return bytes.subarray(start, end);
+    };
     Object.assign(element, { request: { error: 0, maxTets: 900 }, source: { name: "own.mt", size: bytes.length, read } });
     await new Promise((resolve) => element.addEventListener("load", resolve));
     return asked;
   });
   assert.ok(asked.length > 0 && asked.every((end) => end <= file.length));
   await reach(page, "ready");
-  const rested = async () => (await page.evaluate(() => document.querySelector("tetralod-viewer").viewer.settled()), count());
+  const rested = async () => {
+    await page.evaluate(() => document.querySelector("tetralod-viewer").viewer.settled());
+    return count();
+  };
   const count = () => page.evaluate(async () => (await document.querySelector("tetralod-viewer").viewer.mesh()).tets.length / 4);
   const few = await rested();
   assert.ok(few > 100 && few <= 900, `${few} tetrahedra`);
   await page.evaluate(() => (document.querySelector("tetralod-viewer").request = null));
-  await page.waitForFunction((few) => document.querySelector("tetralod-viewer").viewer.mesh().then(({ tets }) => tets.length > 4 * few), few);
+  await page.waitForFunction(
+    (few) =>
+      document
+        .querySelector("tetralod-viewer")
+        .viewer.mesh()
+        .then(({ tets }) => tets.length > 4 * few),
+    few,
+  );
   assert.deepEqual(complaints, []);
   await page.close();
 });

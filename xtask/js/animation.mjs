@@ -61,9 +61,9 @@ await page.evaluate(() => {
   document.adoptedStyleSheets = [sheet];
 });
 await record(LONG);
-await slide("error", steps(90, 30, 8));
+await slide("error", steps(90, 30, 6));
 await record(LONG);
-await slide("cut", [...steps(500, 420, 3), ...steps(420, 620, 6), ...steps(620, 500, 4)]);
+await slide("cut", [...steps(500, 430, 2), ...steps(430, 620, 4), ...steps(620, 500, 3)]);
 await page.mouse.click(370, 330);
 await record(LONG);
 await page.mouse.click(120, 250);

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::{browser, demo, package, shell};
+use crate::{demo, package, shell};
 
 /// What README.md shows.
 const FILE: &str = "docs/flow-past-sphere.gif";
@@ -14,7 +14,6 @@ pub fn run(args: &[String]) -> Result<()> {
     package::ensure_built(package::Profile::Released)?;
     let tetralod = shell::tested_command()?;
     demo::make_data(&tetralod)?;
-    let server = demo::start_server(&tetralod, 0)?;
-    let mut command = shell::command("node", ["xtask/js/animation.mjs", FILE]);
-    shell::run(command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser::require()?.chromium))
+    let (_server, mut script) = demo::page_script(&tetralod, &["xtask/js/animation.mjs", FILE])?;
+    shell::run(&mut script)
 }

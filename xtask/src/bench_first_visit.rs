@@ -4,7 +4,7 @@
 use anyhow::{Result, bail};
 
 use crate::benchmarks_page::{self, Part};
-use crate::{browser, demo, package, shell};
+use crate::{demo, package, shell};
 
 const HEAD: &str = "
 Written by `cargo xtask bench --first-visit`. The demo's page with its large volume, from this machine, in a headless Chromium that has
@@ -23,10 +23,8 @@ pub fn run(options: &[String]) -> Result<()> {
     // As users get it: it answers while the page is timed.
     let tetralod = shell::released_command()?;
     demo::make_all(&tetralod)?;
-    let server = demo::start_server(&tetralod, 0)?;
-    let mut command = shell::command("node", ["benches/first_visit/run.js"]);
-    command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser::require()?.chromium);
-    let table = shell::output(&mut command)?;
+    let (_server, mut script) = demo::page_script(&tetralod, &["benches/first_visit/run.js"])?;
+    let table = shell::output(&mut script)?;
     println!("{table}");
     benchmarks_page::write(Part::FirstVisit, &[HEAD, &table].concat())
 }

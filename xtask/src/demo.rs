@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::thread;
 
@@ -9,7 +10,7 @@ use anyhow::{Context, Result, anyhow, bail};
 
 use crate::serve::Server;
 use crate::volumes::{self, BEFORE_PAGE, DATA, Volume, Volumes};
-use crate::{package, shell};
+use crate::{browser, package, shell};
 
 /// The memory that the large volume takes to build, in KiB: some 130 bytes a tetrahedron, and its data.
 const LARGE_MEMORY: u64 = 3 << 20;
@@ -127,6 +128,14 @@ pub fn make_all(tetralod: &Path) -> Result<()> {
 /// Serves the page as a web site would: the package at `pkg/`, everything else from `www/`.
 pub fn start_server(tetralod: &Path, port: u16) -> Result<Server> {
     Server::start(tetralod, "www", &[("/pkg", package::PKG)], port)
+}
+
+/// A script of Node that drives the page in Chromium, and what serves the page as long as it is there.
+pub fn page_script(tetralod: &Path, words: &[&str]) -> Result<(Server, Command)> {
+    let server = start_server(tetralod, 0)?;
+    let mut command = shell::command("node", words);
+    command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser::require()?.chromium);
+    Ok((server, command))
 }
 
 fn serve_page(tetralod: &Path, port: u16) -> Result<()> {

@@ -24,8 +24,8 @@ pub fn archive() -> Result<()> {
     let program = shell::command_with_page()?;
     let name = format!("tetralod-{}-{}", package::version()?, host()?);
     let folder = Path::new(FOLDER).join(&name);
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
+    if Path::new(FOLDER).exists() {
+        fs::remove_dir_all(FOLDER)?;
     }
     let (pages, completions) = (folder.join("man"), folder.join("completions"));
     [&pages, &completions].into_iter().try_for_each(fs::create_dir_all)?;

@@ -4,7 +4,7 @@ use crate::repair::Repair;
 use crate::restrictions::Angles;
 use crate::{extremes, output};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tetralod::mt::AveragedField;
 use tetralod_build::BuildSummary;
 
@@ -40,7 +40,7 @@ pub(super) struct Report {
     #[serde(skip)]
     pub size: f64,
     /// The files that were read, at their places without links.
-    pub inputs: Vec<PathBuf>,
+    pub inputs: Vec<String>,
     /// What the reader left out of the input or changed, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,

@@ -3,6 +3,7 @@
 use anyhow::{Context, Result};
 use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
 use std::fs::{self, Metadata};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -29,19 +30,24 @@ pub struct Cache {
 /// A file as it was when it was looked at.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seen {
-    pub path: PathBuf,
+    /// Of the system, since a path may be no text.
+    path: OsString,
     /// None of a file that is not there.
     state: Option<(u64, u64)>,
 }
 
 impl Seen {
+    pub fn path(&self) -> &Path {
+        Path::new(&self.path)
+    }
+
     pub fn now(path: &Path) -> Self {
         let nanoseconds = |time: SystemTime| {
             let since = time.duration_since(UNIX_EPOCH).unwrap_or_default();
             u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
         };
         let state = |found: Metadata| Some((found.len(), found.modified().map(nanoseconds).ok()?));
-        Self { path: path.to_owned(), state: fs::metadata(path).ok().and_then(state) }
+        Self { path: path.into(), state: fs::metadata(path).ok().and_then(state) }
     }
 
     pub fn is_there(&self) -> bool {
@@ -49,7 +55,7 @@ impl Seen {
     }
 
     pub fn has_changed(&self) -> bool {
-        *self != Self::now(&self.path)
+        *self != Self::now(self.path())
     }
 
     /// Tells this state of the file from others.
@@ -155,7 +161,12 @@ mod tests {
     fn what_was_built_holds_until_an_input_changes() -> Result<()> {
         let folder = tempfile::tempdir()?;
         let cache = Cache::of(Some(folder.path().join("cache")), &[])?;
-        let input = folder.path().join("mesh.vtu");
+        // A name that is no text, where a system may have one.
+        #[cfg(target_os = "linux")]
+        let name: &std::ffi::OsStr = std::os::unix::ffi::OsStrExt::from_bytes(b"mesh\xff.vtu");
+        #[cfg(not(target_os = "linux"))]
+        let name: &std::ffi::OsStr = "mesh.vtu".as_ref();
+        let input = folder.path().join(name);
         fs::write(&input, "1")?;
         let place = cache.place(&input);
         assert!(Cache::inputs(&place).is_none());

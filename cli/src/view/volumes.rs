@@ -311,7 +311,9 @@ impl Volumes {
         }
         let Report { inputs } =
             serde_json::from_slice(&fs::read(&report)?).context("the report of the build")?;
-        let others = inputs.iter().map(|path| Seen::now(path)).filter(|seen| !is_same(&seen.path, given));
+        // The report names files in text, so one whose name is none is not found there.
+        let others = inputs.iter().map(|path| Seen::now(path));
+        let others = others.filter(|seen| seen.is_there() && !is_same(seen.path(), given));
         let inputs: Vec<Seen> = [before].into_iter().chain(others).collect();
         self.cache.keep(&built, place, &inputs)?;
         Ok(inputs)
@@ -359,7 +361,7 @@ impl Volume {
         if !matches!(self.state, State::Done | State::Failed(_)) {
             return;
         }
-        let now: Vec<Seen> = self.inputs.iter().map(|seen| Seen::now(&seen.path)).collect();
+        let now: Vec<Seen> = self.inputs.iter().map(|seen| Seen::now(seen.path())).collect();
         // A file that is being replaced may be away for a moment.
         if now == self.inputs || !now.iter().all(Seen::is_there) {
             self.differing = None;

@@ -3,6 +3,7 @@
 
 use crate::support::{Folder, command, good, run};
 use serde_json::Value;
+use std::ffi::OsStr;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -20,14 +21,13 @@ struct View {
 
 impl View {
     /// Of these files of a folder, with a page that is there.
-    fn start(folder: &Folder, arguments: &[&str]) -> Self {
+    fn start(folder: &Folder, arguments: &[impl AsRef<OsStr>]) -> Self {
         let (page, cache) = (folder.path("page"), folder.path("cache"));
         fs::create_dir_all(folder.path("page/pkg")).expect("a folder");
         fs::write(folder.path("page/index.html"), "the page").expect("a file");
         fs::write(folder.path("page/pkg/viewer.js"), "the package").expect("a file");
-        let mut all = vec!["view", "--port", "0", "--no-browser", "--page", &page, "--cache", &cache];
-        all.extend(arguments);
-        Self::of(&mut command(&all))
+        let own = ["view", "--port", "0", "--no-browser", "--page", &page, "--cache", &cache];
+        Self::of(command(&own).args(arguments))
     }
 
     fn of(command: &mut Command) -> Self {
@@ -136,6 +136,24 @@ fn what_was_built_is_used_again_until_its_input_changes() {
     assert_eq!(cached(&folder).len(), 2);
 }
 
+/// Other systems have no such names.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_file_whose_name_is_no_text_is_built_and_shown_like_others() {
+    use std::os::unix::ffi::OsStringExt as _;
+    let folder = Folder::new("view-name");
+    let path = folder.path("ball").into_bytes().into_iter().chain(*b"\xff.vti").collect();
+    let path = std::ffi::OsString::from_vec(path);
+    fs::rename(ball(&folder, "ball.vti", "5"), &path).expect("it may have this name");
+    let built = command(&["build", "--json", "-o", &folder.path("a.mt")]).arg(&path).output();
+    let report: Value = serde_json::from_slice(&built.expect("it starts").stdout).expect("JSON");
+    assert!(report["inputs"][0].as_str().expect("a path").ends_with("ball\u{fffd}.vti"), "{report}");
+    for _ in 0..2 {
+        let view = View::start(&folder, &[&path]);
+        assert_eq!(view.done()["volumes"][0]["vertices"], 125);
+    }
+}
+
 /// An MT file of a ball of this size.
 fn mt_of(folder: &Folder, size: &str) -> String {
     let (grid, mt) = (ball(folder, "other.vti", size), folder.path("other.mt"));
@@ -191,7 +209,7 @@ fn a_file_that_is_not_there_is_refused_at_once() {
         let text = String::from_utf8(output.stderr).expect("text");
         assert!(!output.status.success() && text.contains(said), "{arguments:?}: {text}");
     }
-    View::start(&folder, &[]);
+    View::start(&folder, &[""; 0]);
     let output = run(&["view", "--page", &page, "--no-browser", &folder.path("missing.vtu")]);
     let text = String::from_utf8(output.stderr).expect("text");
     assert!(!output.status.success() && text.contains("missing.vtu"), "{text}");

@@ -93,7 +93,7 @@ impl FilesInMemory {
     /// Reads what is wanted of a time step, whatever [`ReadOptions::step`] says, otherwise as [`read_with`](crate::read_with).
     ///
     /// # Errors
-    /// As [`read_with`](crate::read_with); [`ReadReason::NotGiven`] if a file is needed that is not there.
+    /// As [`read_with`](crate::read_with); [`ReadReason::NotGiven`](crate::ReadReason::NotGiven) if a file is needed that is not there.
     pub fn read(&self, step: &StepInMemory, options: &ReadOptions) -> Result<TetMesh, ReadError> {
         let options = ReadOptions { step: step.number, ..options.clone() };
         read_files(&self.files_of(step.file, &options.memory), &options)
