@@ -25,6 +25,7 @@ const SCENES = [
       { name: "vtk.js", page: `${here}/vtkjs.html`, file: "bucky.vti" },
       { name: "VTK.wasm", page: `${here}/vtkwasm.html`, file: "bucky.vti" },
       { name: "tetralod, within 1 %", page: `${here}/tetralod.html?isosurface`, file: "bucky.mt" },
+      { name: "tetralod with WebGL 2", page: `${here}/tetralod.html?isosurface&renderer=webgl`, file: "bucky.mt" },
     ],
   },
   {
@@ -32,6 +33,7 @@ const SCENES = [
     tools: [
       { name: "F3D (VTK in WebAssembly)", page: `${here}/f3d.html`, file: "flow.vtu" },
       { name: "tetralod, within 1 %", page: `${here}/tetralod.html?boundary`, file: "flow.mt" },
+      { name: "tetralod with WebGL 2", page: `${here}/tetralod.html?boundary&renderer=webgl`, file: "flow.mt" },
     ],
   },
 ];
@@ -137,7 +139,7 @@ async function visit(tool, link) {
     const frame = await turned(WARM);
     const scale = await page.evaluate(() => window.scale ?? 1);
     const whole = (await page.evaluate(() => window.drawAll?.())) ? await turned(1) : frame;
-    const name = tool.name.replace(/\W.*/, "");
+    const name = tool.name.replaceAll(/\W+/g, "-");
     const picture = await page.screenshot({ path: join(root, "target/beside-vtk", `${name}-${tool.file}.png`) });
     if (picture.equals(blank)) throw new Error(`${tool.page} shows nothing`);
     return { ...server.sent, first, near, shown, memory: taken, frame, pixels: 100 * scale ** 2, whole };

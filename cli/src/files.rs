@@ -5,15 +5,14 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::fs::File;
 use std::io::{BufWriter, Cursor, Seek, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode_to};
 use tetralod::mt::{Exact, Mt, MtInfo};
 use tetralod::session::{Client, Session};
-use tetralod::stream::{
-    Arrived, FileSource, PartSource, RangeSet, RangeSource, StreamError, Traffic, WantedRange,
-};
+use tetralod::stream::{Arrived, FileSource, PartSource, RangeSource, StreamError, Traffic, WantedRange};
 use tetralod::stream::{HttpOptions, HttpSource};
 use tetralod_build::verify::Reference;
 use tetralod_build::{Construction, Method};
@@ -312,7 +311,7 @@ impl RangeSource for Bytes {
         self.0.total()
     }
 
-    fn held(&self) -> Option<&RangeSet> {
+    fn held(&self) -> Option<&[Range<u64>]> {
         self.0.held()
     }
 

@@ -127,7 +127,7 @@ pub fn make(arguments: &Arguments) -> Result<Made> {
     let limit = own.bytes.unwrap_or(u64::MAX);
     // Text takes four bytes for three; what else is in the page shows when it is there.
     let mut room = limit / 4 * 3;
-    let head = answer.opened.session.needed_bytes(0).len();
+    let head: u64 = answer.opened.session.needed_bytes(0).iter().map(|range| range.end - range.start).sum();
     let part = part_of(query, &answer, u64::MAX)?;
     if (part.bytes().len() as u64) <= room {
         let made = assemble(arguments, &mut answer, &scene, &viewer, &part)?;

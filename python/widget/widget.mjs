@@ -3,9 +3,7 @@
  * the model. `xtask/js/widget.mjs` makes one file of it, with the worker and the wasm module inside.
  */
 
-import packed from "embedded:wasm";
-import script from "embedded:worker";
-import "/pkg/element.js";
+import "/pkg/inline-viewer.js";
 import { namesParts } from "/pkg/fit.js";
 
 /** Cameras go to Python no more often than this, in ms. */
@@ -20,19 +18,6 @@ const NOTHING = { isosurfaces: [], volume: null, slices: null, boundary: null, c
 const STYLE = "position: absolute; left: 0; bottom: 0; padding: 0.3em 0.6em; font: 13px/1.4 system-ui, sans-serif; background: #1c1c1cdd; color: #fff";
 
 const text = JSON.stringify;
-
-/** The addresses of the worker and of the wasm module, while `signal` lasts. */
-async function places(signal) {
-  const bytes = Uint8Array.from(atob(packed), (c) => c.charCodeAt(0));
-  const wasm = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
-  return [addressOf(script, "text/javascript", signal), addressOf(wasm, "application/wasm", signal)];
-}
-
-function addressOf(content, type, signal) {
-  const url = URL.createObjectURL(new Blob([content], { type }));
-  signal.addEventListener("abort", () => URL.revokeObjectURL(url));
-  return url;
-}
 
 /** The file, whose ranges Python reads. Other pages may show the same model: they must not take these answers for theirs. */
 function readerOf(model, signal) {
@@ -77,7 +62,7 @@ function line({ values, position, region }, fields) {
 }
 
 /** Shows the model in `el` until `signal` ends. */
-async function show(model, el, signal) {
+function show(model, el, signal) {
   const element = document.createElement("tetralod-viewer");
   const known = {};
   /** Tells Python, and knows its own words when they come back. */
@@ -93,10 +78,6 @@ async function show(model, el, signal) {
   /** @param {import("/pkg/viewer.js").ViewerState} state */
   const sceneOf = ({ camera, ...scene }) => scene;
 
-  const [worker, wasm] = await places(signal);
-  if (signal.aborted) return;
-  element.setAttribute("worker-url", worker);
-  element.setAttribute("wasm-url", wasm);
   element.setAttribute("label", model.get("name"));
   element.style.aspectRatio = "auto";
   const size = () => (element.style.height = `${model.get("height")}px`);
@@ -104,7 +85,8 @@ async function show(model, el, signal) {
   size();
   const poster = Object.assign(document.createElement("img"), { slot: "poster", alt: "" });
   if (model.get("picture")?.byteLength) element.append(poster);
-  poster.src = addressOf(model.get("picture") ?? "", "image/png", signal);
+  poster.src = URL.createObjectURL(new Blob([model.get("picture") ?? ""], { type: "image/png" }));
+  signal.addEventListener("abort", () => URL.revokeObjectURL(poster.src));
   const card = Object.assign(document.createElement("output"), { hidden: true });
   card.style.cssText = STYLE;
   element.append(card);
@@ -169,7 +151,7 @@ async function show(model, el, signal) {
 /** When the cell runs again, or the widget is closed, the worker ends and the memory of the GPU is freed. */
 function render({ model, el }) {
   const life = new AbortController();
-  show(model, el, life.signal).catch(({ message }) => (el.textContent = message));
+  show(model, el, life.signal);
   return () => life.abort();
 }
 

@@ -73,18 +73,19 @@ impl Session {
 
     /// Says that the source has these bytes of the file and no others: no other is wanted from now on. The mesh is as good as they allow;
     /// [`BlockProgress::absent`] counts the blocks that it lacks. Only for sessions [in parts](Session::in_parts).
-    pub fn hold(&mut self, held: RangeSet) {
-        self.blocks.held = Some(held);
+    pub fn hold(&mut self, held: Vec<Range<u64>>) {
+        self.blocks.held = Some(RangeSet::of(held));
     }
 
     /// The bytes of the file that give the mesh of the request again, or one that is as good as so many bytes of blocks allow: what stands in
-    /// front of the blocks, and of the blocks that were needed those with the largest errors. Of a file without blocks, all that has come.
-    pub fn needed_bytes(&self, most: u64) -> RangeSet {
+    /// front of the blocks, and of the blocks that were needed those with the largest errors. Of a file without blocks, all that has come. Ascending,
+    /// with something between any two.
+    pub fn needed_bytes(&self, most: u64) -> Vec<Range<u64>> {
         let blocks = &self.blocks;
         let is_paged = self.decoder.mt().is_some_and(Mt::is_paged);
         let index = self.decoder.index().filter(|_| is_paged);
         let (Some(head), Some(index)) = (self.decoder.head_end(), index) else {
-            return blocks.arrived.clone();
+            return blocks.arrived.iter().cloned().collect();
         };
         let fields = self.decoder.wanted_fields();
         let was_needed = |&block: &u32| blocks.last_needed.get(block as usize).is_some_and(|&plan| plan > 0);
@@ -98,7 +99,8 @@ impl Session {
             room = room.saturating_sub(bytes);
             fits
         });
-        RangeSet::of(ranges.flatten().chain([0..head]).collect())
+        let needed = RangeSet::of(ranges.flatten().chain(std::iter::once(0..head)).collect());
+        needed.iter().cloned().collect()
     }
 
     /// Which bytes of the file are wanted next, most important first: the more a block lowers the excess of the error for each of

@@ -50,7 +50,7 @@ impl<S: RangeSource> Client<S> {
     pub fn open(source: S, options: DecodeOptions, memory: u64) -> Result<Self, ClientError> {
         let mut session = Session::in_parts(options, memory);
         if let Some(held) = source.held() {
-            session.hold(held.clone());
+            session.hold(held.to_vec());
         }
         let mut client = Self { source, session, asked: Vec::new() };
         while client.session.mesh().is_none() && !client.fetch(PATIENCE)? {}

@@ -18,7 +18,7 @@ pub use error::StreamError;
 pub use http::{CacheFolder, HttpOptions, HttpSource};
 #[doc(hidden)]
 pub use loader::{Action, Failure, Loader, LoaderOptions, Traffic, WantedRange};
-pub use range_set::RangeSet;
+pub(crate) use range_set::RangeSet;
 #[doc(hidden)]
 pub use response::ResponseHead;
 #[doc(hidden)]

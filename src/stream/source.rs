@@ -2,7 +2,6 @@
 
 use super::error::StreamError;
 use super::loader::{Traffic, WantedRange};
-use super::range_set::RangeSet;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::time::Duration;
@@ -21,8 +20,8 @@ pub trait RangeSource {
     /// The size of the whole, once it is known.
     fn total(&self) -> Option<u64>;
 
-    /// The bytes that it has, if those are a part of the whole.
-    fn held(&self) -> Option<&RangeSet> {
+    /// The bytes that it has, if those are a part of the whole: ascending, with something between any two.
+    fn held(&self) -> Option<&[Range<u64>]> {
         None
     }
 
@@ -62,7 +61,8 @@ impl<R: Read + Seek> FileSource<R> {
 /// A part of a file: some of its bytes, in memory.
 #[derive(Clone, Debug)]
 pub struct PartSource {
-    held: RangeSet,
+    /// Ascending, with something between any two.
+    held: Vec<Range<u64>>,
     /// Those of all ranges, one behind the other.
     bytes: Vec<u8>,
     total: u64,
@@ -70,13 +70,14 @@ pub struct PartSource {
 }
 
 impl PartSource {
-    /// These bytes of a file of `total` bytes, as `source` gives them.
+    /// These bytes of a file of `total` bytes, as `source` gives them; `held` as [`Session::needed_bytes`](crate::session::Session::needed_bytes)
+    /// gives it.
     ///
     /// # Errors
     /// If they do not come.
-    pub fn read(source: &mut impl RangeSource, held: &RangeSet, total: u64) -> Result<Self, StreamError> {
+    pub fn read(source: &mut impl RangeSource, held: &[Range<u64>], total: u64) -> Result<Self, StreamError> {
         let mut bytes = Vec::new();
-        for range in held.iter() {
+        for range in held {
             source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
             let part = loop {
                 if let Some((_, part)) = source.next(Duration::from_secs(1))? {
@@ -88,7 +89,7 @@ impl PartSource {
             }
             bytes.extend(part);
         }
-        Ok(Self { held: held.clone(), bytes, total, wanted: Vec::new() })
+        Ok(Self { held: held.to_vec(), bytes, total, wanted: Vec::new() })
     }
 
     /// The bytes of all ranges, one behind the other.
@@ -99,7 +100,7 @@ impl PartSource {
     /// As much of the beginning of `range` as is there.
     fn part(&self, range: &Range<u64>) -> Vec<u8> {
         let mut before = 0;
-        for held in self.held.iter() {
+        for held in &self.held {
             if held.contains(&range.start) {
                 let at = before + (range.start - held.start);
                 let end = at + (range.end.min(held.end) - range.start);
@@ -126,7 +127,7 @@ impl RangeSource for PartSource {
         Some(self.total)
     }
 
-    fn held(&self) -> Option<&RangeSet> {
+    fn held(&self) -> Option<&[Range<u64>]> {
         Some(&self.held)
     }
 }

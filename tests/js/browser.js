@@ -17,7 +17,8 @@ const config = JSON.parse(await readFile(new URL("../../webdriver.json", import.
  */
 export async function launch() {
   const { FIREFOX } = process.env;
-  if (FIREFOX) return puppeteer.launch({ browser: "firefox", executablePath: FIREFOX, headless: true });
+  // Where there is a display, it has WebGL.
+  if (FIREFOX) return puppeteer.launch({ browser: "firefox", executablePath: FIREFOX, headless: process.env.DISPLAY === undefined });
   const executablePath = process.env.CHROMIUM;
   if (!executablePath) throw new Error("CHROMIUM is not set: run this through `cargo xtask`");
   // Playwright's own choice of headless mode and of features would contradict the flags.
@@ -32,6 +33,9 @@ export async function launch() {
   };
   return browser;
 }
+
+/** Run in a page: takes WebGPU from it. */
+export const withoutWebGpu = () => Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
 
 /** Run in a page: takes WebGPU and WebGL 2 from it. */
 export function withoutGpu() {

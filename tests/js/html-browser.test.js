@@ -4,7 +4,7 @@ import { execFileSync } from "node:child_process";
 import { mkdir, rm, symlink, writeFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { launch } from "./browser.js";
+import { launch, withoutGpu, withoutWebGpu } from "./browser.js";
 import { assertDrawn, differing, study } from "./study.js";
 
 const { TETRALOD: tetralod, TETRALOD_FIXTURE: fixture } = process.env;
@@ -100,10 +100,17 @@ test("on a phone all of the model is in the picture, and the menu leaves room fo
   await close();
 });
 
-test("a browser without WebGPU shows the picture, and says why there is no more", async () => {
-  const { page, complaints, close } = await opened(new URL("page.html", folder).href, {
-    prepare: () => Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined }),
-  });
+test("a browser without WebGPU draws it with WebGL, and is offered no volume", async () => {
+  const { page, complaints, close } = await opened(new URL("page.html", folder).href, { prepare: withoutWebGpu });
+  await settled(page);
+  assertDrawn(await picture(page, "webgl"));
+  assert.ok(await page.isDisabled("option[value=volume]"));
+  assert.deepEqual(complaints, []);
+  await close();
+});
+
+test("a browser without WebGPU and WebGL shows the picture, and says why there is no more", async () => {
+  const { page, complaints, close } = await opened(new URL("page.html", folder).href, { prepare: withoutGpu });
   await page.waitForFunction(() => /cannot be shown/.test(document.querySelector("#status")?.textContent ?? ""));
   assert.ok(await page.evaluate(() => document.querySelector("img")?.naturalWidth === 160));
   assert.match((await page.locator("tetralod-viewer").evaluate((element) => element.shadowRoot?.textContent)) ?? "", /WebGPU/);

@@ -1,14 +1,16 @@
-// WebGL 2, which draws where there is no WebGPU: each picture beside that of WebGPU, in numbers and in `target/e2e/webgl/`. In a browser
-// without WebGPU what WebGL draws is looked at alone.
+// WebGL 2, which draws where there is no WebGPU: each picture beside that of WebGPU, in numbers and in `target/e2e/webgl/`. What Firefox
+// draws with WebGL is compared with what Chromium has drawn with WebGPU before.
 import assert from "node:assert/strict";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { launch, servePackage } from "./browser.js";
+import { launch, PATIENCE, servePackage } from "./browser.js";
 import { assertDrawn, differing, distance, study } from "./study.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test e2e`");
 const pictures = new URL("../../target/e2e/webgl/", import.meta.url);
+const { FIREFOX } = process.env;
+const RENDERERS = FIREFOX ? ["webgl"] : ["webgpu", "webgl"];
 
 const PAGE = `<!doctype html><style>canvas { width: 240px; height: 160px }</style><canvas id="webgpu"></canvas><canvas id="webgl"></canvas>
   <script type="importmap">{ "imports": { "tetralod": "/pkg/index.js", "tetralod/viewer": "/pkg/viewer.js" } }</script>`;
@@ -32,7 +34,7 @@ after(async () => {
 });
 
 /** A page with a viewer of the file for each renderer, at the same mesh. */
-async function opened(file, renderers = ["webgpu", "webgl"]) {
+async function opened(file) {
   const page = await browser.newPage();
   await page.goto(server.address);
   await page.evaluate(
@@ -48,12 +50,12 @@ async function opened(file, renderers = ["webgpu", "webgl"]) {
       }
       Object.assign(window, { viewers, errors });
     },
-    /** @type {const} */ ([file, renderers]),
+    /** @type {const} */ ([file, RENDERERS]),
   );
   return page;
 }
 
-/** What each viewer draws of a scene. */
+/** What WebGPU draws of a scene, and what WebGL does. */
 async function drawn(page, name, scene) {
   const seen = [];
   const pngs = await page.evaluate(async (scene) => {
@@ -70,9 +72,10 @@ async function drawn(page, name, scene) {
     }
     return all;
   }, scene);
+  if (FIREFOX) seen.push(await study(page, await readFile(new URL(`${name}-webgpu.png`, pictures))));
   for (const { renderer, bytes } of pngs) {
     const png = Buffer.from(bytes, "base64");
-    await writeFile(new URL(`${name}-${renderer}.png`, pictures), png);
+    await writeFile(new URL(`${name}-${renderer}${FIREFOX ? "-firefox" : ""}.png`, pictures), png);
     seen.push(await study(page, png));
   }
   return seen;
@@ -171,11 +174,17 @@ test("WebGL says what draws, picks the same points, and refuses volumes while it
   const seen = await page.evaluate(() => {
     const { viewers } = /** @type {any} */ (window);
     const points = [-0.4, -0.1, 0.1, 0.3].flatMap((x) => [-0.3, 0, 0.3].map((y) => [x, y]));
-    return Promise.all(viewers.map(async (viewer) => ({ renderer: viewer.renderer, picked: await Promise.all(points.map(([x, y]) => viewer.pick(x, y))) })));
+    // One after the other: picks that are faster than the worker replace each other.
+    const all = async (viewer) => {
+      const picked = [];
+      for (const [x, y] of points) picked.push(await viewer.pick(x, y));
+      return { renderer: viewer.renderer, picked };
+    };
+    return Promise.all(viewers.map(all));
   });
   assert.deepEqual(
     seen.map(({ renderer }) => renderer),
-    ["webgpu", "webgl"],
+    RENDERERS,
   );
   assert.ok(seen[0].picked.filter(Boolean).length > 4, JSON.stringify(seen[0]));
   for (const { picked } of seen) assert.deepEqual(picked, seen[0].picked);
@@ -214,5 +223,45 @@ test("a viewer draws with WebGL where there is no WebGPU, and with what it is as
   assert.equal(seen.renderer, "webgl");
   assert.ok(seen.adapter.length > 0);
   if (/SwiftShader|llvmpipe/.test(seen.adapter)) assert.equal(seen.isSoftware, true);
+  await page.close();
+});
+
+/** Waits until something holds in a page; Playwright and Puppeteer have the words of this in different orders. */
+const until = (page, holds, ...words) =>
+  FIREFOX ? page.waitForFunction(holds, { timeout: PATIENCE }, ...words) : page.waitForFunction(holds, words[0], { timeout: PATIENCE });
+
+test("the page draws with WebGL, says so, and why it draws no volume", async () => {
+  const page = await browser.newPage();
+  await page.goto(`${server.address}index.html?renderer=webgl&url=${encodeURIComponent("/data/abc-flow.mt")}`);
+  await until(page, () => /complete|failed|unsupported/.test(/** @type {any} */ (window).tetralodDemo?.state));
+  const seen = [];
+  for (const mode of ["iso", "slice", "solid", "mesh", "flow"]) {
+    const base64 = await page.evaluate(async (mode) => {
+      /** @type {HTMLElement} */ (document.querySelector(`[name=mode][value=${mode}]`)).click();
+      const { viewer } = /** @type {any} */ (window).tetralodDemo;
+      await viewer.settled();
+      const bytes = new Uint8Array(await (await viewer.screenshot({ samples: 1 })).arrayBuffer());
+      return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+    }, mode);
+    const png = Buffer.from(base64, "base64");
+    await writeFile(new URL(`page-${mode}${FIREFOX ? "-firefox" : ""}.png`, pictures), png);
+    seen.push(await study(page, png));
+    assertDrawn(seen[seen.length - 1], mode);
+    if (seen.length > 1) assert.ok(differing(seen[seen.length - 2], seen[seen.length - 1]) > 0.01, mode);
+  }
+  await writeFile(new URL(`page${FIREFOX ? "-firefox" : ""}.png`, pictures), await page.screenshot());
+  const { renderer, said } = await page.evaluate(() => ({
+    renderer: /** @type {any} */ (window).tetralodDemo.viewer.renderer,
+    said: document.querySelector("#gpu")?.textContent ?? "",
+  }));
+  assert.equal(renderer, "webgl");
+  assert.match(said, /no WebGPU: drawn with WebGL 2/);
+  const turnTo = (mode) => page.evaluate((mode) => /** @type {HTMLElement} */ (document.querySelector(`[name=mode][value=${mode}]`)).click(), mode);
+  const message = (isHidden) => until(page, (isHidden) => /** @type {HTMLElement} */ (document.querySelector("#message")).hidden === isHidden, isHidden);
+  await turnTo("volume");
+  await message(false);
+  assert.match(await page.evaluate(() => document.querySelector("#message")?.textContent ?? ""), /Volumes are not drawn without WebGPU.*slices or an isosurface/s);
+  await turnTo("slice");
+  await message(true);
   await page.close();
 });

@@ -27,7 +27,7 @@ Chromium (`benches/beside_vtk`). Each number is the median of three visits with 
   makes a boundary of tetrahedra (`vtkGeometryFilter`, `vtkDataSetSurfaceFilter` and `vtkDataSetMapper` cannot be made), so that the
   second table is without it.
 - **tetralod** draws a mesh within 1 % of the field's range: for the isosurface only around its value. The others draw the
-  full data.
+  full data. It draws with WebGPU, and in the last column, as in browsers without that, with WebGL 2: without shade in hollows.
 
 *program*: JavaScript and WebAssembly, compressed by gzip. *file*: the whole volume, as `tetralod generate` writes it (`.vti` and
 `.vtu` are compressed by zlib) or as an MT file. *fetched*: what was read of it. *first picture*: the time from the start of
@@ -35,7 +35,7 @@ the navigation to the first picture; for tetralod it shows the base mesh, in whi
 mesh within 5 % of the field's range. *full picture*: to the picture that does not change any more.
 The rows with 20 Mbit/s have a server that sends no faster, and answers after 40 ms. *memory*: of all processes of the browser with the
 full picture, less than those of an empty page. *frame*: from one picture to the next while the camera turns, 640 × 480 pixels,
-drawn in software, since the machine has no GPU: WebGL by VTK's programs, WebGPU by tetralod. Where pictures take longer than 60 ms,
+drawn in software, since the machine has no GPU. Where pictures take longer than 60 ms,
 tetralod draws those of a movement without shade in hollows and with one sample a pixel, then with fewer pixels, which the next row has. *with
 everything*: with shade and four samples a pixel, as at rest.
 

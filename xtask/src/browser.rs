@@ -47,7 +47,7 @@ fn find() -> Option<Browser> {
 
 const FIREFOXES: [&str; 2] = ["firefox-esr", "firefox"];
 
-/// Firefox, for tests that need no GPU: the variable FIREFOX, what PATH has, or a fresh installation.
+/// Firefox, for tests that need no WebGPU: the variable FIREFOX, what PATH has, or a fresh installation.
 pub fn firefox() -> Result<PathBuf> {
     let find = || {
         let given = std::env::var_os("FIREFOX").map(PathBuf::from).filter(|path| path.is_file());
@@ -55,6 +55,17 @@ pub fn firefox() -> Result<PathBuf> {
     };
     let by_hand = "Firefox is needed: install it, or set FIREFOX to its path";
     found_or_installed(find, "Firefox", &["firefox-esr"], by_hand)
+}
+
+/// What runs a program with a display, without which Firefox has no WebGL: nothing where there is one, else a display in memory.
+pub fn display() -> Result<&'static [&'static str]> {
+    if !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some() {
+        return Ok(&[]);
+    }
+    let find = || ["xvfb-run", "xauth"].iter().all(|name| shell::find(name).is_some()).then_some(());
+    let by_hand = "Firefox needs a display: run this on a desktop, or install Xvfb with xvfb-run (Debian: `xvfb`, `xauth` and `libgl1-mesa-dri`)";
+    found_or_installed(find, "Xvfb", &["xvfb", "xauth", "libgl1-mesa-dri"], by_hand)?;
+    Ok(&["xvfb-run", "-a"])
 }
 
 /// nginx, for which the documentation has a configuration: where Debian, other systems and Homebrew put it, or a fresh installation.

@@ -107,6 +107,7 @@ fn install_programs() -> Result<()> {
     browser::vulkan_driver()?;
     browser::require()?;
     browser::firefox()?;
+    browser::display()?;
     browser::nginx()?;
     shell::add_wasm_target()?;
     shell::install_node_tools()
@@ -314,9 +315,15 @@ fn node_tool(path: &str, args: &[&str]) -> Command {
 }
 
 fn node_test(file: &str) -> Command {
+    node_test_by(&[], file)
+}
+
+/// The same by a program that runs another one: its name and options.
+fn node_test_by(runner: &[&str], file: &str) -> Command {
     let file = format!("tests/js/{file}");
-    let mut command =
-        shell::command("node", ["--test", "--test-reporter=spec", "--test-timeout=2700000", &file]);
+    let own = ["node", "--test", "--test-reporter=spec", "--test-timeout=2700000", &file];
+    let words = [runner, &own].concat();
+    let mut command = shell::command(words[0], &words[1..]);
     // It would take the place of Chromium.
     command.env_remove("FIREFOX");
     command
@@ -387,16 +394,19 @@ fn e2e() -> Result<()> {
     demo::make_data(&tetralod)?;
     let server = demo::start_server(&tetralod, 0)?;
     with_fixture(|| {
-        let test = |name: &str, variable: &str, path: &Path| {
-            let mut command = node_test(&format!("{name}-browser.test.js"));
+        let test = |runner: &[&str], name: &str, variable: &str, path: &Path| {
+            let mut command = node_test_by(runner, &format!("{name}-browser.test.js"));
             shell::run(fixture_env(command.env("TETRALOD", &tetralod).env(variable, path)))
         };
-        for name in ["core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "html", "build"] {
-            test(name, "CHROMIUM", &browser.chromium)?;
+        for name in
+            ["core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "html", "build"]
+        {
+            test(&[], name, "CHROMIUM", &browser.chromium)?;
         }
         let firefox = browser::firefox()?;
-        println!("what needs no GPU, in Firefox");
-        ["core", "ranges"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
+        println!("what needs no WebGPU, in Firefox");
+        let display = browser::display()?;
+        ["core", "ranges", "webgl"].into_iter().try_for_each(|name| test(display, name, "FIREFOX", &firefox))
     })?;
     for name in ["state.test.js", "e2e.test.js", "page.test.js", "drop.test.js"] {
         let mut command = node_test(name);

@@ -133,6 +133,7 @@ element.addEventListener("load", ({ detail: { info } }) => {
   controls.field.value = String(shown());
   controls.field.parentElement.hidden = info.fields.length < 2;
   arrange();
+  controls.mode.querySelector("[value=volume]").disabled = element.viewer.renderer === "webgl";
   menu.hidden = false;
   menu.open = innerWidth > 700;
   // With the focus, the wheel zooms and keys turn.
@@ -169,7 +170,7 @@ function failed() {
   if (!element.info) status.textContent = "A picture of it: the volume cannot be shown here.";
 }
 element.addEventListener("error", failed);
-// Where there is no WebGPU, that has shown before this script began.
+// Where nothing can draw, that has shown before this script began.
 if (element.failure) failed();
 
 Object.assign(element, { request, state: { ...scene, camera: camera() }, source: part() });

@@ -47,7 +47,7 @@ impl File {
         let options = DecodeOptions { fields, ..DecodeOptions::default() };
         let mut session = Session::in_parts(options, memory as u64);
         if let Some(held) = loader.held() {
-            session.hold(held.clone());
+            session.hold(held.to_vec());
         }
         Self { session, loader: Some(loader.share()), ..Self::default() }
     }

@@ -5,9 +5,7 @@ use js_sys::{Array, Uint8Array};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
-use tetralod::stream::{
-    Action, Failure, Loader, LoaderOptions, RangeSet, ResponseHead, Traffic, WantedRange,
-};
+use tetralod::stream::{Action, Failure, Loader, LoaderOptions, ResponseHead, Traffic, WantedRange};
 use tetralod_web_options::error::WebError;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -30,7 +28,7 @@ pub type SharedLoader = Rc<RefCell<Loader>>;
 pub struct RangeLoader {
     loader: SharedLoader,
     /// The bytes that can be had, if those are a part of the file.
-    held: Option<RangeSet>,
+    held: Option<Vec<Range<u64>>>,
 }
 
 impl RangeLoader {
@@ -40,8 +38,8 @@ impl RangeLoader {
     }
 
     /// The bytes that can be had, if those are a part of the file.
-    pub(crate) fn held(&self) -> Option<&RangeSet> {
-        self.held.as_ref()
+    pub(crate) fn held(&self) -> Option<&[Range<u64>]> {
+        self.held.as_deref()
     }
 }
 
@@ -76,8 +74,7 @@ impl RangeLoader {
     /// Says, before a file is opened with it, that no other bytes can be had: start and end of each range.
     pub fn hold(&mut self, pairs: &[f64]) {
         let (ranges, _) = pairs.as_chunks::<2>();
-        let ranges = ranges.iter().map(|&[start, end]| start as u64..end as u64);
-        self.held = Some(RangeSet::of(ranges.collect()));
+        self.held = Some(ranges.iter().map(|&[start, end]| start as u64..end as u64).collect());
     }
 
     /// Asks for more or less at a time from now on.
