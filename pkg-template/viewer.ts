@@ -213,6 +213,8 @@ const NO_WEBGPU =
   "this browser has no WebGPU; use a current Chrome, Edge, Firefox or Safari over https (or on localhost)";
 const NO_ADAPTER =
   "the browser gives no GPU adapter; allow hardware acceleration in its settings, or update the graphics driver";
+const NEITHER =
+  "this browser has no WebGPU and no WebGL 2; use a current Chrome, Edge, Firefox or Safari, and allow hardware acceleration in its settings";
 const NO_WEBGL = "this browser has no WebGL 2; allow hardware acceleration in its settings, or update the graphics driver";
 
 const NO_PAGE = 'a viewer draws on a canvas of a page; elsewhere, use MultiTessellation of "tetralod"';
@@ -839,7 +841,7 @@ async function rendererOfPage(asked?: RendererName): Promise<RendererName> {
   const gpu = webGpu();
   if (asked !== "webgl" && (await gpu?.requestAdapter().catch(() => null))) return "webgpu";
   if (asked !== "webgpu" && hasWebGl()) return "webgl";
-  throw new TetralodError("no-webgpu", asked === "webgl" ? NO_WEBGL : gpu ? NO_ADAPTER : NO_WEBGPU);
+  throw new TetralodError("no-webgpu", asked === "webgl" ? NO_WEBGL : gpu ? NO_ADAPTER : asked ? NO_WEBGPU : NEITHER);
 }
 
 function pixels({ width, height }: { width: number; height: number }): [number, number] {

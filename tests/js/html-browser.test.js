@@ -60,6 +60,7 @@ test("the volume is drawn from file:, without a network; its menu works, and the
   assert.match(coarse ?? "", /^[\d,]+ tetrahedra, error at most [1-4](\.\d)? % of the range$/);
   assert.ok((await page.isVisible("#legend")) === false, "an isosurface of one colour has no legend");
 
+  await page.click("summary");
   await page.selectOption("[name=detail]", "0%");
   await page.waitForFunction(() => /no more detail/.test(document.querySelector("#status")?.textContent ?? ""));
   await page.selectOption("[name=detail]", "");

@@ -260,7 +260,10 @@ test("the page draws with WebGL, says so, and why it draws no volume", async () 
   const message = (isHidden) => until(page, (isHidden) => /** @type {HTMLElement} */ (document.querySelector("#message")).hidden === isHidden, isHidden);
   await turnTo("volume");
   await message(false);
-  assert.match(await page.evaluate(() => document.querySelector("#message")?.textContent ?? ""), /Volumes are not drawn without WebGPU.*slices or an isosurface/s);
+  assert.match(
+    await page.evaluate(() => document.querySelector("#message")?.textContent ?? ""),
+    /Volumes are not drawn without WebGPU.*slices or an isosurface/s,
+  );
   await turnTo("slice");
   await message(true);
   await page.close();

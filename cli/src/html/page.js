@@ -135,7 +135,8 @@ element.addEventListener("load", ({ detail: { info } }) => {
   arrange();
   controls.mode.querySelector("[value=volume]").disabled = element.viewer.renderer === "webgl";
   menu.hidden = false;
-  menu.open = innerWidth > 700;
+  // In a narrow window it would lie over what is shown.
+  menu.open = innerWidth > 1100;
   // With the focus, the wheel zooms and keys turn.
   element.shadowRoot.querySelector("canvas").focus({ preventScroll: true, focusVisible: false });
 });

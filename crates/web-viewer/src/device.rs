@@ -51,7 +51,7 @@ pub(crate) trait Device: Draw {
 
 /// A target beside the own one.
 pub(crate) enum Side {
-    WebGpu(SideTarget),
+    WebGpu(Box<SideTarget>),
     WebGl(web_sys::OffscreenCanvas),
 }
 
@@ -114,7 +114,7 @@ impl Device for Renderer {
 
     fn side(&mut self, canvas: web_sys::OffscreenCanvas) -> Result<Side> {
         let size = [canvas.width(), canvas.height()];
-        Ok(Side::WebGpu(self.side_target(wgpu::SurfaceTarget::OffscreenCanvas(canvas), size)?))
+        Ok(Side::WebGpu(Box::new(self.side_target(wgpu::SurfaceTarget::OffscreenCanvas(canvas), size)?)))
     }
 
     fn draw_side(&mut self, side: &mut Side, camera: &Camera, look: &Look, samples: u32) -> Result<()> {
