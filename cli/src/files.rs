@@ -12,7 +12,7 @@ use std::time::Duration;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode_to};
 use tetralod::mt::{Exact, Mt, MtInfo};
 use tetralod::session::{Client, Session};
-use tetralod::stream::{Arrived, FileSource, PartSource, RangeSource, StreamError, Traffic, WantedRange};
+use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, Traffic, WantedRange};
 use tetralod::stream::{HttpOptions, HttpSource};
 use tetralod_build::verify::Reference;
 use tetralod_build::{Construction, Method};
@@ -322,7 +322,7 @@ impl RangeSource for Bytes {
 
 impl Bytes {
     /// Of a part of a file.
-    pub fn of_part(part: PartSource) -> Self {
+    pub fn of_part(part: FileSource<Cursor<Vec<u8>>>) -> Self {
         Self(Box::new(part))
     }
 

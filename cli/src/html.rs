@@ -15,11 +15,12 @@ use base64::prelude::BASE64_STANDARD;
 use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-use std::io::Write;
+use std::io::{Cursor, Write};
+use std::ops::Range;
 use std::path::PathBuf;
 use tetralod::format::DecodeOptions;
 use tetralod::session::Client;
-use tetralod::stream::{PartSource, RangeSource};
+use tetralod::stream::{FileSource, RangeSource};
 use tetralod_render::scene::SceneState;
 
 /// Writes one HTML file that shows a volume: with the viewer, and of the MT file what a request needs.
@@ -129,16 +130,18 @@ pub fn make(arguments: &Arguments) -> Result<Made> {
     let mut room = limit / 4 * 3;
     let head: u64 = answer.opened.session.needed_bytes(0).iter().map(|range| range.end - range.start).sum();
     let part = part_of(query, &answer, u64::MAX)?;
-    if (part.bytes().len() as u64) <= room {
+    if (part.bytes.len() as u64) <= room {
         let made = assemble(arguments, &mut answer, &scene, &viewer, &part)?;
         if made.page.len() as u64 <= limit {
             return Ok(made);
         }
-        room = (part.bytes().len() as u64 - head).saturating_sub(beyond(&made, limit));
+        room = (part.bytes.len() as u64 - head).saturating_sub(beyond(&made, limit));
     }
     loop {
         let part = part_of(query, &answer, room)?;
-        let client = Client::open(Bytes::of_part(part.clone()), DecodeOptions::default(), u64::MAX)?;
+        let source =
+            FileSource::of_part(Cursor::new(part.bytes.clone()), part.ranges.clone(), answer.opened.bytes);
+        let client = Client::open(Bytes::of_part(source), DecodeOptions::default(), u64::MAX)?;
         let made = assemble(arguments, &mut query.answer_from(client)?, &scene, &viewer, &part)?;
         if made.page.len() as u64 <= limit {
             return Ok(made);
@@ -149,7 +152,7 @@ pub fn make(arguments: &Arguments) -> Result<Made> {
             made.page.len(),
             if own.no_poster { "" } else { ", or --no-poster" }
         );
-        room = room.min(part.bytes().len() as u64 - head).saturating_sub(beyond(&made, limit));
+        room = room.min(part.bytes.len() as u64 - head).saturating_sub(beyond(&made, limit));
     }
 }
 
@@ -158,13 +161,18 @@ fn beyond(made: &Made, limit: u64) -> u64 {
     (made.page.len() as u64).saturating_sub(limit).div_ceil(4) * 3
 }
 
+/// Some bytes of a file.
+struct Part {
+    ranges: Vec<Range<u64>>,
+    /// Those of all ranges, one behind the other.
+    bytes: Vec<u8>,
+}
+
 /// What the mesh of an answer needs of the file, with so many bytes of blocks at most.
-fn part_of(query: &Query, answer: &Answer, most: u64) -> Result<PartSource> {
-    let needed = answer.opened.session.needed_bytes(most);
-    let name = || query.file.display().to_string();
-    Bytes::of(&query.file)
-        .and_then(|mut bytes| Ok(PartSource::read(&mut bytes, &needed, answer.opened.bytes)?))
-        .with_context(name)
+fn part_of(query: &Query, answer: &Answer, most: u64) -> Result<Part> {
+    let ranges = answer.opened.session.needed_bytes(most);
+    let bytes = Bytes::of(&query.file).and_then(|mut source| Ok(source.read(&ranges)?));
+    Ok(Part { bytes: bytes.with_context(|| query.file.display().to_string())?, ranges })
 }
 
 /// Puts a page together.
@@ -173,7 +181,7 @@ fn assemble(
     answer: &mut Answer,
     scene: &SceneState,
     viewer: &str,
-    part: &PartSource,
+    part: &Part,
 ) -> Result<Made> {
     let Arguments { query, placed, own, .. } = arguments;
     let [width, height] = own.poster;
@@ -194,19 +202,18 @@ fn assemble(
     let name = query.file.file_name().unwrap_or_default().to_string_lossy();
     let title = own.title.as_deref().unwrap_or(&name);
     let needs = answer.needs.iter().map(|named| &named.need);
-    let held: Vec<u64> =
-        part.held().into_iter().flat_map(|held| held.iter()).flat_map(|r| [r.start, r.end]).collect();
+    let ranges: Vec<u64> = part.ranges.iter().flat_map(|range| [range.start, range.end]).collect();
     let about = json!({
         "name": name,
         "title": title,
-        "ranges": held,
+        "ranges": ranges,
         "total": opened.bytes,
         "request": request::options(needs, &query.limits(), answer.field, opened.session.regions()),
         "scene": without_nulls(serde_json::to_value(scene)?),
         "camera": camera.state(),
         "narrowest": 0.5 * placed.camera_of_one(&bounds, 0.5).distance(),
     });
-    let volume = BASE64_STANDARD.encode(part.bytes());
+    let volume = BASE64_STANDARD.encode(&part.bytes);
     let page = page(title, &about.to_string().replace('<', "\\u003c"), &poster, viewer, &volume)?;
     let report = Report {
         bytes: page.len(),

@@ -23,4 +23,4 @@ pub(crate) use range_set::RangeSet;
 pub use response::ResponseHead;
 #[doc(hidden)]
 pub use source::Arrived;
-pub use source::{FileSource, PartSource, RangeSource};
+pub use source::{FileSource, RangeSource};

@@ -25,62 +25,16 @@ pub trait RangeSource {
         None
     }
 
-    /// What has been asked and has come over a network, if that is where the bytes are.
-    fn traffic(&self) -> Option<Traffic> {
-        None
-    }
-}
-
-/// Ranges of whatever can be read and sought: a file that is open, bytes in memory.
-#[derive(Debug)]
-pub struct FileSource<R> {
-    reader: R,
-    total: u64,
-    /// The most important last.
-    wanted: Vec<WantedRange>,
-}
-
-impl<R: Read + Seek> FileSource<R> {
-    /// Takes over `reader`.
-    pub fn new(mut reader: R) -> Result<Self, StreamError> {
-        let total = reader.seek(SeekFrom::End(0)).map_err(unreadable)?;
-        Ok(Self { reader, total, wanted: Vec::new() })
-    }
-
-    fn read(&mut self, range: &Range<u64>) -> Result<Vec<u8>, StreamError> {
-        let range = range.start.min(self.total)..range.end.min(self.total);
-        let length = range.end.saturating_sub(range.start);
-        let mut bytes = Vec::new();
-        self.reader.seek(SeekFrom::Start(range.start)).map_err(unreadable)?;
-        self.reader.by_ref().take(length).read_to_end(&mut bytes).map_err(unreadable)?;
-        // What was there when it was opened is gone: the file is being written to.
-        if (bytes.len() as u64) < length { Err(StreamError::Changed) } else { Ok(bytes) }
-    }
-}
-
-/// A part of a file: some of its bytes, in memory.
-#[derive(Clone, Debug)]
-pub struct PartSource {
-    /// Ascending, with something between any two.
-    held: Vec<Range<u64>>,
-    /// Those of all ranges, one behind the other.
-    bytes: Vec<u8>,
-    total: u64,
-    wanted: Vec<WantedRange>,
-}
-
-impl PartSource {
-    /// These bytes of a file of `total` bytes, as `source` gives them; `held` as [`Session::needed_bytes`](crate::session::Session::needed_bytes)
-    /// gives it.
+    /// The bytes of these ranges, one behind the other. What was wanted before no longer is.
     ///
     /// # Errors
-    /// If they do not come.
-    pub fn read(source: &mut impl RangeSource, held: &[Range<u64>], total: u64) -> Result<Self, StreamError> {
+    /// If one of them does not come whole.
+    fn read(&mut self, ranges: &[Range<u64>]) -> Result<Vec<u8>, StreamError> {
         let mut bytes = Vec::new();
-        for range in held {
-            source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
+        for range in ranges {
+            self.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
             let part = loop {
-                if let Some((_, part)) = source.next(Duration::from_secs(1))? {
+                if let Some((_, part)) = self.next(Duration::from_secs(1))? {
                     break part;
                 }
             };
@@ -89,46 +43,60 @@ impl PartSource {
             }
             bytes.extend(part);
         }
-        Ok(Self { held: held.to_vec(), bytes, total, wanted: Vec::new() })
+        Ok(bytes)
     }
 
-    /// The bytes of all ranges, one behind the other.
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    /// As much of the beginning of `range` as is there.
-    fn part(&self, range: &Range<u64>) -> Vec<u8> {
-        let mut before = 0;
-        for held in &self.held {
-            if held.contains(&range.start) {
-                let at = before + (range.start - held.start);
-                let end = at + (range.end.min(held.end) - range.start);
-                return self.bytes[at as usize..end as usize].to_vec();
-            }
-            before += held.end - held.start;
-        }
-        Vec::new()
+    /// What has been asked and has come over a network, if that is where the bytes are.
+    fn traffic(&self) -> Option<Traffic> {
+        None
     }
 }
 
-impl RangeSource for PartSource {
-    fn want(&mut self, wanted: &[WantedRange]) {
-        self.wanted = wanted.to_vec();
+/// Ranges of whatever can be read and sought: a file that is open, bytes in memory; or of a part of a file.
+#[derive(Debug)]
+pub struct FileSource<R> {
+    reader: R,
+    total: u64,
+    /// Of a part of a file, where what `reader` has stands in it.
+    held: Option<Vec<Range<u64>>>,
+    /// The most important last.
+    wanted: Vec<WantedRange>,
+}
+
+impl<R: Read + Seek> FileSource<R> {
+    /// Takes over `reader`.
+    pub fn new(mut reader: R) -> Result<Self, StreamError> {
+        let total = reader.seek(SeekFrom::End(0)).map_err(unreadable)?;
+        Ok(Self { reader, total, held: None, wanted: Vec::new() })
     }
 
-    fn next(&mut self, _patience: Duration) -> Result<Option<Arrived>, StreamError> {
-        let Some(WantedRange { range, .. }) = self.wanted.pop() else { return Ok(None) };
-        let bytes = self.part(&range);
-        Ok(Some((range, bytes)))
+    /// A part of a file of `total` bytes: `reader` has the bytes of these ranges, one behind the other, as [`RangeSource::read`] gives
+    /// those of [`Session::needed_bytes`](crate::session::Session::needed_bytes).
+    pub fn of_part(reader: R, held: Vec<Range<u64>>, total: u64) -> Self {
+        Self { reader, total, held: Some(held), wanted: Vec::new() }
     }
 
-    fn total(&self) -> Option<u64> {
-        Some(self.total)
+    /// Where the reader has a range, or as much of its beginning as is there.
+    fn place(&self, range: &Range<u64>) -> Range<u64> {
+        let Some(held) = &self.held else { return range.start.min(self.total)..range.end.min(self.total) };
+        let mut before = 0;
+        for run in held {
+            if run.contains(&range.start) {
+                return before + range.start - run.start..before + range.end.min(run.end) - run.start;
+            }
+            before += run.end - run.start;
+        }
+        0..0
     }
 
-    fn held(&self) -> Option<&[Range<u64>]> {
-        Some(&self.held)
+    fn bytes_of(&mut self, range: &Range<u64>) -> Result<Vec<u8>, StreamError> {
+        let range = self.place(range);
+        let length = range.end.saturating_sub(range.start);
+        let mut bytes = Vec::new();
+        self.reader.seek(SeekFrom::Start(range.start)).map_err(unreadable)?;
+        self.reader.by_ref().take(length).read_to_end(&mut bytes).map_err(unreadable)?;
+        // What was there when it was opened is gone: the file is being written to.
+        if (bytes.len() as u64) < length { Err(StreamError::Changed) } else { Ok(bytes) }
     }
 }
 
@@ -144,13 +112,17 @@ impl<R: Read + Seek> RangeSource for FileSource<R> {
 
     fn next(&mut self, _patience: Duration) -> Result<Option<Arrived>, StreamError> {
         let Some(wanted) = self.wanted.pop() else { return Ok(None) };
-        let bytes = self.read(&wanted.range)?;
+        let bytes = self.bytes_of(&wanted.range)?;
         self.wanted.retain(|other| other.range != wanted.range);
         Ok(Some((wanted.range, bytes)))
     }
 
     fn total(&self) -> Option<u64> {
         Some(self.total)
+    }
+
+    fn held(&self) -> Option<&[Range<u64>]> {
+        self.held.as_deref()
     }
 }
 
@@ -177,5 +149,20 @@ mod tests {
         assert_eq!(next(), Some((50..60, Vec::new())));
         assert_eq!(next(), None);
         assert_eq!(source.total(), Some(10));
+    }
+
+    #[test]
+    fn a_part_of_a_file_gives_what_it_has() {
+        let mut file = FileSource::new(Cursor::new(b"0123456789".to_vec())).expect("it can be read");
+        let held = vec![0..3, 5..9];
+        let bytes = file.read(&held).expect("it is there");
+        assert_eq!(bytes, b"0125678");
+        assert_eq!(file.read(&[8..11]), Err(StreamError::Changed));
+        let mut part = FileSource::of_part(Cursor::new(bytes), held.clone(), 10);
+        assert_eq!((part.held(), part.total()), (Some(&held[..]), Some(10)));
+        assert_eq!(part.read(&[6..9, 0..1, 5..7]), Ok(b"678056".to_vec()));
+        part.want(&[WantedRange { range: 1..6, priority: 0.0 }]);
+        assert_eq!(part.next(Duration::ZERO), Ok(Some((1..6, b"12".to_vec()))));
+        assert_eq!(part.read(&[3..4]), Err(StreamError::Changed));
     }
 }

@@ -46,6 +46,8 @@ const SCRIPTS = [
   "viewer-worker",
   "viewer",
   "vtk",
+  "webgl-shaders",
+  "webgl",
   "worker",
 ];
 

@@ -12,8 +12,7 @@ use tetralod::mt::{MtKind, MultiTessellation, UpdatePages};
 use tetralod::refine::{Need, Request};
 use tetralod::session::{Client, ClientError, Session};
 use tetralod::stream::{
-    Action, Arrived, FileSource, Loader, LoaderOptions, PartSource, RangeSource, ResponseHead, StreamError,
-    WantedRange,
+    Action, Arrived, FileSource, Loader, LoaderOptions, RangeSource, ResponseHead, StreamError, WantedRange,
 };
 use tetralod_build::{BuildConfig, Construction, build};
 use tetralod_io::generate;
@@ -274,10 +273,11 @@ fn length(ranges: &[Range<u64>]) -> u64 {
 }
 
 /// A client of a part of a file.
-fn client_of_part(file: &[u8], whole: &Client<Counted>, most: u64) -> Client<PartSource> {
+fn client_of_part(file: &[u8], whole: &Client<Counted>, most: u64) -> Client<FileSource<Cursor<Vec<u8>>>> {
     let needed = whole.session().needed_bytes(most);
-    let part = PartSource::read(&mut Counted::new(file).0, &needed, file.len() as u64).expect("it is there");
-    assert_eq!(part.bytes().len() as u64, length(&needed));
+    let bytes = Counted::new(file).0.read(&needed).expect("it is there");
+    assert_eq!(bytes.len() as u64, length(&needed));
+    let part = FileSource::of_part(Cursor::new(bytes), needed, file.len() as u64);
     Client::open(part, DecodeOptions::default(), u64::MAX).expect("a sound file")
 }
 
