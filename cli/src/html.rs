@@ -238,7 +238,7 @@ fn without_nulls(value: Value) -> Value {
 }
 
 const STYLE: &str = include_str!("html/page.css");
-const CODE: &str = include_str!("html/page.js");
+const CODE: &str = concat!(include_str!("html/page.js"), "\n", include_str!("html/part.js"));
 const BODY: &str = include_str!("html/body.html");
 
 /// The text of a page. Its policy names what is in it and nothing else, so that nothing else is ever asked for or run.
