@@ -156,6 +156,15 @@ pub fn ensure_built(profile: Profile) -> Result<()> {
     build_all(profile)
 }
 
+/// Packs the extension for VS Code, with the package as it is published.
+pub fn pack_extension() -> Result<()> {
+    ensure_built(Profile::Released)?;
+    let file = "target/vscode/tetralod.vsix";
+    shell::run(&mut shell::command("node", ["xtask/js/vscode.mjs", PKG, file]))?;
+    println!("{file}");
+    Ok(())
+}
+
 /// Compiles the module with the benchmark, which the package does not have, into `folder`.
 pub fn build_bench(folder: &Path) -> Result<()> {
     prepare()?;

@@ -292,6 +292,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("bins.test.js"))?;
     shell::run(&mut node_test("geometry.test.js"))?;
     shell::run(&mut node_test("policy.test.js"))?;
+    let tetralod = shell::tested_command()?;
     with_fixture(|| {
         for name in [
             "package.test.js",
@@ -301,8 +302,9 @@ fn js() -> Result<()> {
             "places.test.js",
             "views.test.js",
             "regions.test.js",
+            "vscode.test.js",
         ] {
-            shell::run(fixture_env(&mut node_test(name)))?;
+            shell::run(fixture_env(node_test(name).env("TETRALOD", &tetralod)))?;
         }
         Ok(())
     })
@@ -398,9 +400,10 @@ fn e2e() -> Result<()> {
             let mut command = node_test_by(runner, &format!("{name}-browser.test.js"));
             shell::run(fixture_env(command.env("TETRALOD", &tetralod).env(variable, path)))
         };
-        for name in
-            ["core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "html", "build"]
-        {
+        for name in [
+            "core", "ranges", "streams", "parts", "viewer", "webgl", "places", "element", "html", "vscode",
+            "build",
+        ] {
             test(&[], name, "CHROMIUM", &browser.chromium)?;
         }
         let firefox = browser::firefox()?;
