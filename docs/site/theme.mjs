@@ -41,7 +41,7 @@ class Router extends KindRouter {
   getIdealBaseName(reflection) {
     if (!(reflection instanceof DocumentReflection)) return super.getIdealBaseName(reflection);
     const page = source(reflection) ?? reflection.name;
-    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace("python/README", "python").replace("examples/js/README", "howto/examples").replace(/\.md$/, "").toLowerCase();
+    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace("python/README", "python").replace("examples/js/README", "howto/examples").replace("editors/vscode/README", "howto/vscode").replace(/\.md$/, "").toLowerCase();
   }
 }
 
