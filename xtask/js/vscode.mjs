@@ -8,38 +8,14 @@ import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { dirname, extname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
+import { bundled } from "./bundle.mjs";
 
 // The tools of the project are those of its tests.
 const tools = createRequire(new URL("../../tests/js/package.json", import.meta.url));
-const { build } = tools("esbuild");
 const { zipSync } = tools("fflate");
 
 const [folder, file] = process.argv.slice(2).map((path) => resolve(path));
 const own = (path) => fileURLToPath(new URL(`../../${path}`, import.meta.url));
-
-/** One module that imports nothing. */
-async function bundled(entry) {
-  const { outputFiles } = await build({
-    entryPoints: [entry],
-    bundle: true,
-    minify: true,
-    target: "es2022",
-    format: "esm",
-    charset: "utf8",
-    legalComments: "none",
-    logLevel: "warning",
-    write: false,
-    plugins: [
-      {
-        name: "package",
-        setup({ onResolve }) {
-          onResolve({ filter: /^\/pkg\// }, ({ path }) => ({ path: join(folder, path.slice("/pkg/".length)) }));
-        },
-      },
-    ],
-  });
-  return outputFiles[0].contents;
-}
 
 const { version } = JSON.parse(await readFile(join(folder, "package.json"), "utf8"));
 const manifest = { ...JSON.parse(await readFile(own("editors/vscode/package.json"), "utf8")), version };
@@ -50,13 +26,13 @@ const extension = {
   "package.json": text(JSON.stringify(manifest, null, 2)),
   "README.md": await readFile(own("editors/vscode/README.md")),
   "extension.js": await readFile(own("editors/vscode/extension.js")),
-  "page/page.js": await bundled(own("editors/vscode/page.mjs")),
+  "page/page.js": await bundled(own("editors/vscode/page.mjs"), folder),
   "page/body.html": text((await readFile(own("cli/src/html/body.html"), "utf8")).replace("{version}", version)),
   "page/page.css": await readFile(own("cli/src/html/page.css")),
   "page/editor.css": await readFile(own("editors/vscode/editor.css")),
   "builder/package.json": text('{ "type": "module" }\n'),
-  "builder/build.js": await bundled(join(folder, "build.js")),
-  "builder/build-worker.js": await bundled(join(folder, "build-worker.js")),
+  "builder/build.js": await bundled(join(folder, "build.js"), folder),
+  "builder/build-worker.js": await bundled(join(folder, "build-worker.js"), folder),
   "builder/tetralod_build_bg.wasm": await readFile(join(folder, "tetralod_build_bg.wasm")),
 };
 for (const licence of ["LICENSE-MIT", "LICENSE-APACHE", "THIRD-PARTY-LICENSES.txt"]) extension[licence] = await readFile(join(folder, licence));

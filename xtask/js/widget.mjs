@@ -4,31 +4,11 @@
  * node xtask/js/widget.mjs FOLDER_OF_THE_PACKAGE FILE
  */
 
-import { createRequire } from "node:module";
-import { join, resolve } from "node:path";
+import { mkdir, writeFile } from "node:fs/promises";
+import { dirname, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
+import { bundled } from "./bundle.mjs";
 
-// The tools of the project are those of its tests.
-const { build } = createRequire(new URL("../../tests/js/package.json", import.meta.url))("esbuild");
-
-const [folder, outfile] = process.argv.slice(2).map((path) => resolve(path));
-
-await build({
-  entryPoints: [fileURLToPath(new URL("../../python/widget/widget.mjs", import.meta.url))],
-  outfile,
-  bundle: true,
-  minify: true,
-  target: "es2022",
-  format: "esm",
-  charset: "utf8",
-  legalComments: "none",
-  logLevel: "warning",
-  plugins: [
-    {
-      name: "package",
-      setup({ onResolve }) {
-        onResolve({ filter: /^\/pkg\// }, ({ path }) => ({ path: join(folder, path.slice("/pkg/".length)) }));
-      },
-    },
-  ],
-});
+const [folder, file] = process.argv.slice(2).map((path) => resolve(path));
+await mkdir(dirname(file), { recursive: true });
+await writeFile(file, await bundled(fileURLToPath(new URL("../../python/widget/widget.mjs", import.meta.url)), folder));
