@@ -47,7 +47,7 @@ usage: cargo xtask COMMAND
   demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
                                  volume is made in the background, unless with --small
   wheel [--OPTION...]            build the wheel of the Python package into target/python/released; options are maturin's
-  vscode                         pack the extension for VS Code as target/vscode/tetralod.vsix
+  vscode                         pack the extension for VS Code as target/release-files/tetralod.vsix
   docs                           make the documentation's site in target/docs
   pages [--small]                make the demo and the documentation's site as one folder of static files, target/pages;
                                  with --small without the large volume

@@ -159,7 +159,7 @@ pub fn ensure_built(profile: Profile) -> Result<()> {
 /// Packs the extension for VS Code, with the package as it is published.
 pub fn pack_extension() -> Result<()> {
     ensure_built(Profile::Released)?;
-    let file = "target/vscode/tetralod.vsix";
+    let file = "target/release-files/tetralod.vsix";
     shell::run(&mut shell::command("node", ["xtask/js/vscode.mjs", PKG, file]))?;
     println!("{file}");
     Ok(())

@@ -21,6 +21,7 @@ pub fn run(args: &[String]) -> Result<()> {
     package::build(&[])?;
     check_page()?;
     release_files::archive()?;
+    package::pack_extension()?;
     release_files::recipes()?;
     // They need each other, which are not on crates.io yet: cargo takes them from here.
     let mut publish = shell::cargo(["publish", "--dry-run", "--locked"]);
