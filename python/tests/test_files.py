@@ -166,11 +166,16 @@ def test_ctrl_c_ends_a_wait():
             connection.close()
 
         thread = threading.Thread(target=interrupt)
+        # Where a shell has started this in the background, the signal is ignored.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
         thread.start()
-        with pytest.raises(KeyboardInterrupt):
-            tetralod.open(f"http://127.0.0.1:{server.getsockname()[1]}/a.mt")
-        ended.set()
-        thread.join()
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                tetralod.open(f"http://127.0.0.1:{server.getsockname()[1]}/a.mt")
+        finally:
+            signal.signal(signal.SIGINT, before)
+            ended.set()
+            thread.join()
 
 
 def test_the_command_is_in_the_package(tmp_path):

@@ -359,13 +359,13 @@ def test_in_chromium_it_is_moved_by_code_and_by_mouse(ball, notebook):
 
 
 @pytest.mark.graphics
-def test_in_chromium_without_webgpu_there_is_the_picture_and_the_reason(ball, notebook):
+def test_in_chromium_without_a_gpu_there_is_the_picture_and_the_reason(ball, notebook):
     dot = three_pixels()
-    widget, chromium = notebook(ball, query="?no-webgpu", then=lambda widget: widget.set_trait("picture", dot))
+    widget, chromium = notebook(ball, query="?no-gpu", then=lambda widget: widget.set_trait("picture", dot))
     until(lambda: widget.status, lambda: widget.failure is not None)
     assert (widget.status, widget.failure["code"]) == ("failed", "no-webgpu")
     assert chromium("until", "document.querySelector('img[slot=poster]').naturalWidth") == 3
-    assert "no WebGPU" in chromium("until", "shown.element.shadowRoot.querySelector('[part=message]').textContent")
+    assert "no WebGPU and no WebGL 2" in chromium("until", "shown.element.shadowRoot.querySelector('[part=message]').textContent")
 
 
 @pytest.mark.graphics

@@ -22,7 +22,7 @@ def show(
     picture: bool = True,
     **how: Any,
 ) -> Viewer:
-    """Draws a volume in a notebook: in JupyterLab, VS Code, Colab or marimo, in a browser with WebGPU. Needs ``pip install tetralod[notebook]``.
+    """Draws a volume in a notebook: in JupyterLab, VS Code, Colab or marimo, in a browser with WebGPU, or with WebGL 2 for all but volumes. Needs ``pip install tetralod[notebook]``.
 
     The browser asks Python for the bytes that the picture needs, so that any ``Mt`` will do, and all that ``tetralod.open`` takes: a path, an
     address, or bytes. ``how`` are arguments of ``tetralod.open``, such as ``headers``. While a cell runs, Python answers no questions.

@@ -46,7 +46,7 @@ class Viewer(anywidget.AnyWidget):
     height = traitlets.Int(480).tag(sync=True)
     """In CSS pixels."""
     picture = traitlets.Bytes(read_only=True).tag(sync=True)
-    """The PNG that is shown where there are no scripts or no WebGPU; empty until the widget is shown, and where none can be drawn."""
+    """The PNG that is shown where there are no scripts, or neither WebGPU nor WebGL 2; empty until the widget is shown, and where none can be drawn."""
     request = traitlets.Dict().tag(sync=True, to_json=lambda value, widget: _sent(value, widget.mt.info))
     """The mesh, in the words of ``Mt.refine``."""
     scene = traitlets.Dict().tag(sync=True)
