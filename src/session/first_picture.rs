@@ -11,7 +11,8 @@ const EMPTY: f64 = 0.02;
 
 impl Session {
     /// The value of a field whose isosurface is worth to be shown first, at all of its times: that which parts the volume at the first time
-    /// into two groups of values that differ most (Otsu 1979). The middle of the range if the file has no histogram.
+    /// into two groups of values that differ most (Otsu 1979). The middle of the range if the file has no histogram, and that of the values at the first
+    /// time where these have no surface otherwise: then they are all of one group.
     ///
     /// None if there is no such field, or it has not arrived.
     pub fn first_isovalue(&self, field: usize) -> Option<f64> {
@@ -23,7 +24,11 @@ impl Session {
             None => info.range_at_all_times(field),
         };
         let part = self.decoder.histogram(first).map_or(0.5, |shares| parting(&shares));
-        Some(low * (1.0 - part) + high * part)
+        let value = low * (1.0 - part) + high * part;
+        let extremes = info.fields[first].extremes.as_ref();
+        let extremes = extremes.map(|extremes| [extremes.min.value, extremes.max.value]);
+        let beside = extremes.filter(|[least, most]| value <= *least || value >= *most);
+        Some(beside.map_or(value, |[least, most]| 0.5 * least + 0.5 * most))
     }
 
     /// Whether the domain fills the box around it but for a fiftieth, as that of a grid: then its boundary shows little. None before the base mesh is there.

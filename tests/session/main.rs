@@ -5,6 +5,7 @@ mod changes;
 mod client;
 mod curve;
 mod deformation;
+mod first_picture;
 mod hostile;
 mod kinds;
 mod network;
