@@ -91,7 +91,7 @@ fn set_region(region: &Region, set: &mut impl FnMut(&str, Value) -> Option<Value
 /// A part of a range as the text that is read as it, or as the next larger number: a page must not need more than was asked for here.
 fn percentage(error: f64) -> String {
     let near = 100.0 * error;
-    let enough = [near.next_down(), near].into_iter().find(|percent| percent / 100.0 >= error);
+    let enough = [near.next_down().max(0.0), near].into_iter().find(|percent| percent / 100.0 >= error);
     format!("{}%", enough.unwrap_or(near.next_up()))
 }
 
