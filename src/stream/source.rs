@@ -157,12 +157,12 @@ mod tests {
         let held = vec![0..3, 5..9];
         let bytes = file.read(&held).expect("it is there");
         assert_eq!(bytes, b"0125678");
-        assert_eq!(file.read(&[8..11]), Err(StreamError::Changed));
+        assert_eq!(file.read(std::slice::from_ref(&(8..11))), Err(StreamError::Changed));
         let mut part = FileSource::of_part(Cursor::new(bytes), held.clone(), 10);
         assert_eq!((part.held(), part.total()), (Some(&held[..]), Some(10)));
         assert_eq!(part.read(&[6..9, 0..1, 5..7]), Ok(b"678056".to_vec()));
         part.want(&[WantedRange { range: 1..6, priority: 0.0 }]);
         assert_eq!(part.next(Duration::ZERO), Ok(Some((1..6, b"12".to_vec()))));
-        assert_eq!(part.read(&[3..4]), Err(StreamError::Changed));
+        assert_eq!(part.read(std::slice::from_ref(&(3..4))), Err(StreamError::Changed));
     }
 }
