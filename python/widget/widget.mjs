@@ -84,9 +84,18 @@ function show(model, el, signal) {
   heard(model, signal, "change:height", size);
   size();
   const poster = Object.assign(document.createElement("img"), { slot: "poster", alt: "" });
-  if (model.get("picture")?.byteLength) element.append(poster);
-  poster.src = URL.createObjectURL(new Blob([model.get("picture") ?? ""], { type: "image/png" }));
-  signal.addEventListener("abort", () => URL.revokeObjectURL(poster.src));
+  const forget = () => URL.revokeObjectURL(poster.src);
+  signal.addEventListener("abort", forget);
+  // Python may draw it after the page is there.
+  const pose = () => {
+    const png = model.get("picture");
+    if (!png?.byteLength) return;
+    forget();
+    poster.src = URL.createObjectURL(new Blob([png], { type: "image/png" }));
+    element.append(poster);
+  };
+  heard(model, signal, "change:picture", pose);
+  pose();
   const card = Object.assign(document.createElement("output"), { hidden: true });
   card.style.cssText = STYLE;
   element.append(card);
