@@ -48,7 +48,7 @@ export interface TetralodViewerElement {
   /** The address of the volume. */
   get src(): string | null;
   set src(url: string | URL | null);
-  /** What is drawn. Default: the isosurface where there is an `isovalue` or the volume fills its box, else the boundary. */
+  /** What is drawn. Default: the isosurface where there is an `isovalue`, or by `info.surfaceFirst`; else the boundary. */
   get mode(): ViewerMode | null;
   set mode(mode: ViewerMode | null);
   /** One value, or several with spaces between them, in units of the field. Default: that of its `FieldInfo`. */
@@ -348,7 +348,7 @@ export class TetralodViewerElement extends Base {
   /** What is drawn. */
   #scene(info?: MtInfo): ViewerChanges {
     const [map, background] = ["map", "background"].map((name) => this.getAttribute(name));
-    const mode = this.#mode || (info && (info.isBox ? "isosurface" : "boundary"));
+    const mode = this.#mode || (info && (info.surfaceFirst ? "isosurface" : "boundary"));
     const middle = info && (info.bounds[2] + info.bounds[5]) / 2;
     return {
       ...(mode ? { ...NOTHING, ...MODES[mode]({ values: this.#values, middle }) } : UNNAMED),

@@ -17,7 +17,7 @@ type Field = Pick<FieldInfo, "name" | "min" | "max"> & Partial<Pick<FieldInfo, "
 
 /** What is asked of a volume. */
 export interface Volume {
-  isBox: boolean;
+  surfaceFirst: boolean;
   regions?: { all: { name: string; labels: number[] }[] } | undefined;
   fields: Field[];
   bounds: number[];
@@ -31,8 +31,8 @@ export const namesParts = (scene: ViewerChanges | Record<string, unknown>) =>
 export const withoutParts = (scene: SceneState): SceneState =>
   Object.fromEntries(Object.entries(scene).filter(([name]) => !namesParts({ [name]: true })));
 
-/** What is drawn of a volume where nothing is asked for: its boundary, or the isosurface of one whose boundary is a box. */
-const firstOf = ({ isBox }: Volume): SceneState => (isBox ? { isosurfaces: [{}] } : { boundary: {} });
+/** What is drawn of a volume where nothing is asked for: its boundary, or an isosurface where that shows more. */
+const firstOf = ({ surfaceFirst }: Volume): SceneState => (surfaceFirst ? { isosurfaces: [{}] } : { boundary: {} });
 
 /** `scene` with some parts replaced; `null` gives a part its default. */
 export function changedScene<S extends SceneState>(scene: S, changes: ViewerChanges | Record<string, unknown>): S {

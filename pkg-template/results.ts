@@ -183,10 +183,10 @@ export interface MtInfo {
    */
   firstField: number;
   /**
-   * Whether the domain fills the box around it, but for a fiftieth of its volume: as that of a grid. Then its boundary shows little, and
-   * an isosurface is drawn first.
+   * Whether an isosurface of that field shows more than the boundary, and is drawn first: where the domain fills the box around it, but for
+   * a fiftieth of its volume, as that of a grid, and the field is not linear, so that its isosurfaces are no planes.
    */
-  isBox: boolean;
+  surfaceFirst: boolean;
   /** The parts that all meshes keep apart; `undefined` for files that were built without `--preserve`. */
   regions: Regions | undefined;
   /**

@@ -83,8 +83,8 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
 /** Words of the address: `get` gives none for what there is first, `set` never gets none and tells whether they mean something. */
 /** @typedef {{ get: (state: Readonly<State>) => string, set: (words: string, draft: State) => boolean }} Entry */
 
-/** What a volume is shown in first: what fills its box as an isosurface, all else by its boundary. @returns {Mode} */
-const firstView = () => (demo.info?.isBox === false ? "solid" : "iso");
+/** What a volume is shown in first: an isosurface where it shows more than the boundary. @returns {Mode} */
+const firstView = () => (demo.info?.surfaceFirst === false ? "solid" : "iso");
 /** Nothing is cut off a boundary that is shown first. */
 const firstCut = () => (firstView() === "solid" ? 0 : MIDDLE);
 

@@ -4,9 +4,9 @@ mod request;
 
 use super::files::{self, Bytes};
 use super::parse::parse_bytes;
-use super::query::{Answer, Query, Summary};
-use super::render::shown::{self, About, Shown};
-use super::render::{self, Placed};
+use super::query::{Answer, Summary};
+use super::render;
+use super::render::drawn::Drawn;
 use super::view::page::Page;
 use super::{output, usage};
 use anyhow::{Context, Result, ensure};
@@ -37,11 +37,7 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
-    query: Query,
-    #[command(flatten)]
-    shown: Shown,
-    #[command(flatten)]
-    placed: Placed,
+    drawn: Drawn,
     #[command(flatten)]
     own: Own,
 }
@@ -89,9 +85,9 @@ pub struct Made {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let Arguments { output, query, shown, .. } = arguments;
+    let Arguments { output, drawn, .. } = arguments;
     files::check_ending(output, "html")?;
-    files::check_output(output, query.files().chain(shown.files()))?;
+    files::check_output(output, drawn.files())?;
     let Made { page, report, summary, seconds } = make(arguments)?;
     files::write_file(output, |out| Ok(out.write_all(page.as_bytes())?))?;
     let [viewer, volume, poster] = [report.viewer_bytes, report.volume_bytes, report.poster_bytes]
@@ -104,13 +100,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(why) = &report.no_poster {
         output::note(&format!("warning: the page has no picture for browsers that cannot draw: {why}"));
     }
-    query.print(&report, rows, (&summary, seconds))
+    drawn.query.print(&report, rows, (&summary, seconds))
 }
 
 /// Makes the page.
 pub fn make(arguments: &Arguments) -> Result<Made> {
-    let Arguments { query, shown, own, .. } = arguments;
-    shown.check();
+    let Arguments { drawn, own, .. } = arguments;
+    let query = &drawn.query;
+    drawn.shown.check();
     if query.is_stopped_early() {
         usage::refuse_usage("--max-ms and --max-updates stop work before it is done; a page does all of it");
     }
@@ -118,18 +115,14 @@ pub fn make(arguments: &Arguments) -> Result<Made> {
     let viewer = String::from_utf8(viewer.into_owned()).context("pkg/inline-viewer.js")?;
     let mut answer = query.answer()?;
     let field = answer.opened.info()?.fields[answer.field].clone();
-    let about = About {
-        bounds: answer.opened.session.view().bounds(),
-        is_box: answer.opened.session.is_box() == Some(true),
-        field: &field,
-    };
-    let scene = shown.state(query, &about)?;
-    shown::warnings(&scene, &about).iter().for_each(|warning| output::note(&format!("warning: {warning}")));
+    let scene = drawn.scene(&mut answer.opened.session, answer.field, &field)?;
     let limit = own.bytes.unwrap_or(u64::MAX);
     // Text takes four bytes for three; what else is in the page shows when it is there.
     let mut room = limit / 4 * 3;
-    let head: u64 = answer.opened.session.needed_bytes(0).iter().map(|range| range.end - range.start).sum();
-    let part = part_of(query, &answer, u64::MAX)?;
+    let needed = |most: u64| answer.opened.session.needed_bytes(most);
+    let head: u64 = needed(0).iter().map(|range| range.end - range.start).sum();
+    let source = Bytes::of(&query.file).and_then(|mut source| Part::of(&mut source, needed(u64::MAX)));
+    let part = source.with_context(|| query.file.display().to_string())?;
     if (part.bytes.len() as u64) <= room {
         let made = assemble(arguments, &mut answer, &scene, &viewer, &part)?;
         if made.page.len() as u64 <= limit {
@@ -137,11 +130,11 @@ pub fn make(arguments: &Arguments) -> Result<Made> {
         }
         room = (part.bytes.len() as u64 - head).saturating_sub(beyond(&made, limit));
     }
+    let mut source = part.source(answer.opened.bytes);
     loop {
-        let part = part_of(query, &answer, room)?;
-        let source =
-            FileSource::of_part(Cursor::new(part.bytes.clone()), part.ranges.clone(), answer.opened.bytes);
-        let client = Client::open(Bytes::of_part(source), DecodeOptions::default(), u64::MAX)?;
+        let part = Part::of(&mut source, answer.opened.session.needed_bytes(room))?;
+        let source = Bytes::of_part(part.source(answer.opened.bytes));
+        let client = Client::open(source, DecodeOptions::default(), u64::MAX)?;
         let made = assemble(arguments, &mut query.answer_from(client)?, &scene, &viewer, &part)?;
         if made.page.len() as u64 <= limit {
             return Ok(made);
@@ -168,11 +161,15 @@ struct Part {
     bytes: Vec<u8>,
 }
 
-/// What the mesh of an answer needs of the file, with so many bytes of blocks at most.
-fn part_of(query: &Query, answer: &Answer, most: u64) -> Result<Part> {
-    let ranges = answer.opened.session.needed_bytes(most);
-    let bytes = Bytes::of(&query.file).and_then(|mut source| Ok(source.read(&ranges)?));
-    Ok(Part { bytes: bytes.with_context(|| query.file.display().to_string())?, ranges })
+impl Part {
+    fn of(source: &mut impl RangeSource, ranges: Vec<Range<u64>>) -> Result<Self> {
+        Ok(Self { bytes: source.read(&ranges)?, ranges })
+    }
+
+    /// A file of so many bytes of which this part is there.
+    fn source(&self, total: u64) -> FileSource<Cursor<Vec<u8>>> {
+        FileSource::of_part(Cursor::new(self.bytes.clone()), self.ranges.clone(), total)
+    }
 }
 
 /// Puts a page together.
@@ -183,7 +180,7 @@ fn assemble(
     viewer: &str,
     part: &Part,
 ) -> Result<Made> {
-    let Arguments { query, placed, own, .. } = arguments;
+    let Arguments { drawn: Drawn { query, placed, .. }, own, .. } = arguments;
     let [width, height] = own.poster;
     let aspect = f64::from(width) / f64::from(height);
     let bounds = answer.opened.session.view().bounds();

@@ -1,22 +1,22 @@
 //! `tetralod render`: a picture of the mesh.
 
+pub mod drawn;
 mod movie;
 mod picture;
-pub mod shown;
+mod shown;
 
 use super::deform::Displaced;
-use super::parse::{one_of, parse_numbers, parse_positive};
-use super::query::{Query, Scope, Summary};
+use super::query::{Scope, Summary};
 use super::{files, output, steps};
 use anyhow::{Context, Result, anyhow};
+use drawn::Drawn;
 use indicatif::ProgressBar;
-use movie::{Frame, Movie, Target, parse_output};
+use movie::{Movie, Target, parse_output};
 use picture::Picture;
 use serde::Serialize;
-use shown::{About, Shown};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetralod::geom::{Bounds, Camera, CameraState, Projection, ViewPreset};
+use tetralod::geom::{Camera, CameraState};
 use tetralod::mesh::Averaged;
 use tetralod::mt::MtInfo;
 use tetralod::session::Session;
@@ -25,7 +25,6 @@ use tetralod_render::scene::{Background, Legend, SceneState};
 use tetralod_render::{SceneRenderer, ShowError};
 
 const PICTURE: &str = "Picture";
-const CAMERA: &str = "Camera";
 
 /// The size of a picture in which lines have their width in pixels; in larger ones they get wider.
 const USUAL: [u32; 2] = [1280, 960];
@@ -46,11 +45,7 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE", value_parser = parse_output, required_unless_present = "print_scene")]
     output: Option<PathBuf>,
     #[command(flatten)]
-    query: Query,
-    #[command(flatten)]
-    shown: Shown,
-    #[command(flatten)]
-    placed: Placed,
+    drawn: Drawn,
     #[command(flatten)]
     movie: Movie,
     /// Width and height in pixels.
@@ -76,82 +71,11 @@ pub struct Arguments {
     print_scene: bool,
 }
 
-/// The options that place the camera.
-#[derive(clap::Args)]
-#[command(next_help_heading = CAMERA)]
-pub struct Placed {
-    /// The side from which it is seen; home is the front, a little from the right and from above.
-    #[arg(long, value_name = "SIDE", value_parser = one_of(SIDES), default_value = "home", allow_hyphen_values = true)]
-    from: ViewPreset,
-    /// Then go around it: to the right and upwards, in degrees.
-    #[arg(
-        long,
-        value_name = "YAW,PITCH",
-        value_parser = |text: &str| parse_numbers::<2>(text, "a turn"),
-        default_value = "0,0",
-        hide_default_value = true,
-        allow_hyphen_values = true
-    )]
-    turn: [f64; 2],
-    /// Magnify: 1 shows all of the model, 2 half of its width.
-    #[arg(long, value_name = "F", value_parser = parse_positive, default_value = "1", allow_hyphen_values = true)]
-    zoom: f64,
-    /// What is farther away does not look smaller.
-    #[arg(long)]
-    orthographic: bool,
-}
-
-/// Sides to look from.
-const SIDES: [(&str, ViewPreset); 7] = [
-    ("home", ViewPreset::Home),
-    ("+x", ViewPreset::AgainstX),
-    ("-x", ViewPreset::AlongX),
-    ("+y", ViewPreset::AgainstY),
-    ("-y", ViewPreset::AlongY),
-    ("+z", ViewPreset::AgainstZ),
-    ("-z", ViewPreset::AlongZ),
-];
-
 pub fn parse_dimensions(text: &str) -> Result<[u32; 2], String> {
     let wrong = || format!("'{text}' is no width and height in pixels, such as 1280x960");
     let (width, height) = text.split_once('x').ok_or_else(wrong)?;
     let [width, height] = [width, height].map(|side| side.trim().parse().ok().filter(|side| *side > 0));
     Ok([width.ok_or_else(wrong)?, height.ok_or_else(wrong)?])
-}
-
-impl Placed {
-    /// The camera of each picture, at one distance from what it looks at: the largest at which one of them shows all.
-    fn cameras(&self, bounds: &Bounds, aspect: f64, frames: &[Frame]) -> Vec<Camera> {
-        // What turns has its middle in the middle of all pictures.
-        let fit =
-            if frames.iter().any(|frame| frame.turned != 0.0) { Camera::fit_around } else { Camera::fit };
-        let all = frames.iter().map(|frame| {
-            let mut camera = self.camera(bounds, aspect, frame.turned);
-            fit(&mut camera, bounds, aspect);
-            camera
-        });
-        let mut cameras: Vec<Camera> = all.collect();
-        let farthest = cameras.iter().map(Camera::distance).fold(0.0, f64::max);
-        cameras.iter_mut().for_each(|camera| camera.zoom(farthest / camera.distance() / self.zoom));
-        cameras
-    }
-
-    /// The camera of one picture.
-    pub fn camera_of_one(&self, bounds: &Bounds, aspect: f64) -> Camera {
-        self.cameras(bounds, aspect, &[Frame::default()]).remove(0)
-    }
-
-    /// The camera that looks in the right direction, `turned` by so many degrees around the model.
-    fn camera(&self, bounds: &Bounds, aspect: f64, turned: f64) -> Camera {
-        let mut camera = Camera::home(bounds, aspect);
-        if self.orthographic {
-            camera.set_projection(Projection::Orthographic);
-        }
-        camera.turn_to(self.from);
-        let [yaw, pitch] = self.turn.map(f64::to_radians);
-        camera.orbit(yaw + turned.to_radians(), pitch);
-        camera
-    }
 }
 
 /// The result as programs get it.
@@ -223,18 +147,19 @@ impl Colours {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    arguments.shown.check();
+    let Drawn { query, shown, placed } = &arguments.drawn;
+    shown.check();
     let Some(output) = arguments.output.as_ref().filter(|_| !arguments.print_scene) else {
-        return print_scene(arguments);
+        return print_scene(&arguments.drawn);
     };
     let (movie, target) = (&arguments.movie, arguments.movie.target(output));
-    files::check_output(&target.path(0), arguments.query.files().chain(arguments.shown.files()))?;
+    files::check_output(&target.path(0), arguments.drawn.files())?;
     // Whether it can draw shows before anything is read.
     let size = arguments.size;
     let renderer = renderer(size)?;
     let of_all = movie.is_over_time();
     let scope = Scope { at_all_times: of_all, ..Scope::default() };
-    let mut answer = arguments.query.answer_for(&scope)?;
+    let mut answer = query.answer_for(&scope)?;
     let start = Instant::now();
     let info = answer.opened.info()?;
     let steps = if of_all { steps::in_order(info, answer.field)? } else { Vec::new() };
@@ -243,13 +168,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         [field.min, field.max] = info.range_at_all_times(answer.field);
     }
     let times = of_all.then(|| steps.iter().filter_map(|&step| info.fields[step].time).collect());
-    let about = About {
-        bounds: answer.opened.session.view().bounds(),
-        is_box: answer.opened.session.is_box() == Some(true),
-        field: &field,
-    };
-    let state = arguments.shown.state(&arguments.query, &about)?;
-    shown::warnings(&state, &about).iter().for_each(|warning| output::note(&format!("warning: {warning}")));
+    let bounds = answer.opened.session.view().bounds();
+    let state = arguments.drawn.scene(&mut answer.opened.session, answer.field, &field)?;
     let frames = movie.frames(&steps);
     let mut scene = SceneRenderer::new(renderer);
     scene.set_pixel_ratio([0, 1].map(|k| size[k] as f32 / USUAL[k] as f32).into_iter().fold(1.0, f32::max));
@@ -268,18 +188,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         scene.set_state(state).map_err(explained)?;
         scene.update(session).map_err(explained)?;
-        arguments.shown.check_steps(&arguments.query, session, scene.deformation())?;
+        shown.check_steps(query, session, scene.deformation())?;
         if cameras.is_empty() {
             let displaced = scene.deformation().and_then(|_| scene.shown_bounds(session));
             let aspect = f64::from(size[0]) / f64::from(size[1]);
-            cameras = arguments.placed.cameras(&displaced.unwrap_or(about.bounds), aspect, &frames);
+            cameras = placed.cameras(&displaced.unwrap_or(bounds), aspect, &frames);
         }
         let camera = &cameras[number];
         let before = number as u64 * u64::from(arguments.samples);
         let drawn = |count: u32| bar.set_position(before + u64::from(count));
         let pixels = wait(scene.picture(session, camera, arguments.samples, drawn)).map_err(explained)?;
         let own = Report::of(arguments, &scene, session, camera)?;
-        let about = description(&arguments.query.file, &own, &answer.summary);
+        let about = description(&query.file, &own, &answer.summary);
         report.get_or_insert(own);
         let is_transparent = scene.state().background == Background::Transparent;
         Ok(Picture { size, pixels, is_transparent, about })
@@ -294,7 +214,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         answer.summary.time = answer.summary.time.filter(|_| !of_all);
     }
     let seconds = start.elapsed().as_secs_f64();
-    arguments.query.print(&report, rows(&target, &report), (&answer.summary, seconds))
+    query.print(&report, rows(&target, &report), (&answer.summary, seconds))
 }
 
 impl Report {
@@ -361,14 +281,14 @@ fn description(file: &Path, report: &Report, mesh: &Summary) -> String {
 }
 
 /// Prints the scene of the base mesh.
-fn print_scene(arguments: &Arguments) -> Result<()> {
-    let name = || arguments.query.file.display().to_string();
-    let mut opened = files::Opened::of(files::open_parts(&arguments.query.file).with_context(name)?);
-    let bounds = opened.session.view().bounds();
+fn print_scene(drawn: &Drawn) -> Result<()> {
+    let query = &drawn.query;
+    let name = || query.file.display().to_string();
+    let mut opened = files::Opened::of(files::open_parts(&query.file).with_context(name)?);
     let info = opened.info()?;
-    let field = &info.fields[arguments.query.field_index(info).with_context(name)?];
-    let is_box = opened.session.is_box() == Some(true);
-    output::json(&arguments.shown.state(&arguments.query, &About { bounds, is_box, field })?)
+    let index = query.field_index(info).with_context(name)?;
+    let field = info.fields[index].clone();
+    output::json(&drawn.scene(&mut opened.session, index, &field)?)
 }
 
 /// A picture of a scene, as the bytes of a PNG.

@@ -107,8 +107,9 @@ class Info:
     something nor says where it is."""
     regions: Regions | None
     """``None`` if the file was built without ``preserve``."""
-    is_box: bool | None
-    """Whether the domain fills the box around it, but for a fiftieth of its volume: as that of a grid."""
+    surface_first: bool | None
+    """Whether an isosurface of that field shows more than the boundary: where the domain fills the box around it, but for a fiftieth of its
+    volume, as that of a grid, and the field is not linear. It is drawn first then."""
     exact_values: str
     """Whether the file keeps exact values (``lossless``): ``"none"``, ``"here"``, or ``"missing"`` where it is cut off."""
     metadata: dict[str, str]

@@ -15,13 +15,13 @@ const FIELDS = [0, 1, 2].flatMap((time) => [
 
 /** @type {Record<string, any>} */
 const VOLUMES = {
-  flow: { kind: "half-edge", vertices: 1000, tetrahedra: 5000, updates: 900, isBox: true, firstField: 0, bounds: [0, 0, 0, 2, 4, 8], fields: FIELDS },
+  flow: { kind: "half-edge", vertices: 1000, tetrahedra: 5000, updates: 900, surfaceFirst: true, firstField: 0, bounds: [0, 0, 0, 2, 4, 8], fields: FIELDS },
   plain: {
     kind: "explicit",
     vertices: 300,
     tetrahedra: 1000,
     updates: 200,
-    isBox: true,
+    surfaceFirst: true,
     firstField: 0,
     bounds: [-1, -1, -1, 1, 1, 1],
     fields: [{ name: "density", unit: "", min: -2, max: 6, isovalue: 2, time: undefined }],
@@ -42,7 +42,7 @@ const REGIONS = NAMES.map((name, i) => ({
   color: `#${(100 + 5 * i).toString(16)}8080`,
   bounds: [0, 0, 0, 1, 1, 1],
 }));
-VOLUMES.parts = { ...VOLUMES.plain, kind: "half-edge", isBox: false, regions: { arrays: ["part"], deviation: 0, all: REGIONS } };
+VOLUMES.parts = { ...VOLUMES.plain, kind: "half-edge", surfaceFirst: false, regions: { arrays: ["part"], deviation: 0, all: REGIONS } };
 
 const HOME = { target: [1, 2, 4], distance: 20, yaw: -0.75, pitch: 0.12, projection: "perspective" };
 

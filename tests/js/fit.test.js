@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { changedScene, checkNames, fitScene, namesParts, withoutParts } from "../../pkg/fit.js";
 
 const volume = {
-  isBox: true,
+  surfaceFirst: true,
   fields: [
     { name: "p", min: -1, max: 1 },
     { name: "u", min: 0, max: 4 },
@@ -107,7 +107,7 @@ test("a threshold stays where the volume has its field and a value in its range"
 test("a vector that displaces is one of the file, by its name or by three fields", () => {
   const part = (name, component) => ({ name, min: -1, max: 1, vector: { name: "disp", component } });
   const volume = {
-    isBox: false,
+    surfaceFirst: false,
     bounds: [0, 0, 0, 1, 1, 1],
     fields: [part("a", 0), part("b", 1), part("c", 2), ...["v_x", "v_y", "v_z", "p"].map((name) => ({ name, min: 0, max: 1 }))],
   };
@@ -169,7 +169,7 @@ test("values, planes, boxes, points and lengths of another volume go", () => {
 });
 
 test("where nothing is named or left, there is the isosurface of a box, and the boundary of all else", () => {
-  const part = { ...volume, isBox: false };
+  const part = { ...volume, surfaceFirst: false };
   assert.deepEqual(fit({ outline: false }), { scene: { outline: false, isosurfaces: [{}] }, dropped: [], isFirst: true });
   assert.deepEqual(fitScene({ outline: false }, part), { scene: { outline: false, boundary: {} }, dropped: [], isFirst: true });
   assert.ok(namesParts({ volume: null }) && !namesParts({ outline: true, colours: {} }));

@@ -1,6 +1,6 @@
 //! Promise: what is shown when nothing is asked for is there.
 
-use crate::support::meshes::{cube, hilly, linear};
+use crate::support::meshes::{blocks, cube, hilly, linear};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::TetMesh;
 use tetralod::refine::Request;
@@ -44,4 +44,19 @@ fn the_first_isovalue_has_a_surface_at_the_first_time() {
             assert_eq!(session.first_isovalue(2), Some(value), "it is that of all times");
         }
     }
+}
+
+#[test]
+fn an_isosurface_comes_first_where_it_is_no_plane_in_a_box() {
+    let first = |field: fn([f64; 3]) -> f64, cut: bool| {
+        let mesh = blocks([4; 3], &[field], |cell| !cut || cell.iter().any(|&i| i > 1));
+        opened(&mesh, true).surface_first(0)
+    };
+    let bump: fn([f64; 3]) -> f64 = |p| (-8.0 * p.map(|x| (x - 0.5) * (x - 0.5)).iter().sum::<f64>()).exp();
+    assert_eq!(first(bump, false), Some(true));
+    assert_eq!(first(bump, true), Some(false));
+    assert_eq!(first(linear, false), Some(false));
+    assert_eq!(first(|_| 3.0, false), Some(false), "there is no surface");
+    // The corners are those of a linear function, what is between them is not.
+    assert_eq!(first(|p| p[0] + 3.0 * p[1] * (1.0 - p[1]), false), Some(true));
 }

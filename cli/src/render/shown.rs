@@ -27,7 +27,7 @@ const COLOURS: &str = "Colours";
 #[command(next_help_heading = SHOWN)]
 pub struct Shown {
     /// What is shown; several between commas. Without it, what the options below are for, or else the
-    /// boundary; of a volume that fills its box, the isosurface.
+    /// boundary; an isosurface of a volume that fills its box, unless the field is linear.
     #[arg(long = "mode", value_name = "MODE,…", value_delimiter = ',')]
     modes: Vec<Mode>,
     /// Isosurface at this value, in units of the field (repeatable) [default: the values of --iso, or that
@@ -194,8 +194,8 @@ fn quantities() -> PossibleValuesParser {
 /// What a scene needs to know of the volume.
 pub struct About<'a> {
     pub bounds: Bounds,
-    /// Whether the domain is that box.
-    pub is_box: bool,
+    /// Whether an isosurface shows more of it than its boundary.
+    pub surface_first: bool,
     pub field: &'a FieldInfo,
 }
 
@@ -226,7 +226,7 @@ impl Shown {
     }
 
     /// What to add: the modes, or those that other options are for.
-    fn wanted(&self, query: &Query, is_box: bool) -> Vec<Mode> {
+    fn wanted(&self, query: &Query, surface_first: bool) -> Vec<Mode> {
         if !self.modes.is_empty() {
             return self.modes.clone();
         }
@@ -245,8 +245,7 @@ impl Shown {
         ];
         let wanted: Vec<Mode> = implied.into_iter().filter(|(_, is)| *is).map(|(mode, _)| mode).collect();
         let is_nothing = wanted.is_empty() && self.scene.is_none();
-        // The boundary of a box shows little.
-        if is_nothing { vec![if is_box { Mode::Isosurface } else { Mode::Boundary }] } else { wanted }
+        if is_nothing { vec![if surface_first { Mode::Isosurface } else { Mode::Boundary }] } else { wanted }
     }
 
     /// The scene.
@@ -255,7 +254,7 @@ impl Shown {
             Some(path) => read_json(path)?,
             None => SceneState::default(),
         };
-        let wanted = self.wanted(query, about.is_box);
+        let wanted = self.wanted(query, about.surface_first);
         if !self.modes.is_empty() {
             hide_others(&mut state, &wanted);
         }

@@ -73,7 +73,7 @@ pub fn info(session: &Session) -> Option<JsInfo> {
         ("updates", info.updates.into()),
         ("exactValues", session.decoder().exact_status().name().into()),
         ("regions", session.regions().map_or(JsValue::UNDEFINED, |all| regions(all, info))),
-        ("isBox", session.is_box().into()),
+        ("surfaceFirst", session.surface_first(info.first_field()).into()),
         ("firstField", info.first_field().into()),
     ]))
 }

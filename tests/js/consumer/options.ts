@@ -147,7 +147,7 @@ const infos: Members<MtInfo> = {
   tetrahedra: "number",
   exactValues: "string",
   firstField: "number",
-  isBox: "boolean",
+  surfaceFirst: "boolean",
   regions: "object undefined",
   updates: "number",
 };
