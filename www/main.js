@@ -194,7 +194,7 @@ function showDevice({ adapter, isSoftware, renderer }) {
 
 /** What lies over the picture: axes, probes, the plot. @param {import("tetralod/viewer").Viewer} viewer */
 function attachOverlay(viewer) {
-  const covered = ["legend", "growth"].map((id) => $(id));
+  const covered = [$("legend")];
   page.overlay = new OverlayView(svg("overlay"), { covered, onSide: lookFrom });
   page.probes = new Probes();
   viewer.addEventListener("overlay", ({ detail }) => (page.overlay.data = detail));

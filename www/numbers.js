@@ -33,13 +33,13 @@ export function showGrowth() {
   const { info, totalBytes, receivedBytes } = demo;
   if (!info) return;
   const { vertices, tetrahedra } = info;
-  const whole = totalBytes ? `, ${size(totalBytes)} as MT` : "";
+  const whole = totalBytes ? `${size(totalBytes)} as MT, ` : "";
   const arrived = element("b", {}, size(receivedBytes));
   const origin = originOf();
   const before = origin ? `${size(origin.bytes)} as ${origin.format}` : `${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU`;
-  const words = `${count(tetrahedra)} tetrahedra: ${before}${whole}, `;
   const software = viewer().isSoftware ? [element("small", {}, "No GPU: drawn in software", element("span", {}, ", coarser while something moves"))] : [];
-  $("growth").replaceChildren(words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched", ...software);
+  const words = [`${count(tetrahedra)} tetrahedra: `, element("span", {}, `${before}, `), whole];
+  $("growth").replaceChildren(...words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched", ...software);
 }
 
 /** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. @param {import("tetralod").BlockProgress} blocks @param {number} bytes */
