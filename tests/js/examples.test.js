@@ -179,6 +179,11 @@ test("react: the element, and a canvas that StrictMode uses twice", async () => 
   await draws("react-canvas", { folder: "react/dist", what: "canvas" });
 });
 
+test("online: a volume that the page builds itself", async () => {
+  await npm(["run", "build"], at("online"));
+  await draws("online", { folder: "online/dist" });
+});
+
 test("notebook: a cell that imports from another origin and runs again", async () => {
   const prepare = (page) =>
     page.route("https://cdn.jsdelivr.net/npm/tetralod/*", async (route) => {
