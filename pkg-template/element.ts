@@ -296,7 +296,13 @@ export class TetralodViewerElement extends Base {
     const mine = ++this.#opened;
     this.#isOther = false;
     const [viewer, { source }] = [this.#viewer, this];
-    if (!viewer || !source) return this.#become("empty");
+    if (!viewer) return this.#become("empty");
+    // Before the volume is there, its background alone is. What is wrong with it, `open` says.
+    const hasBackground = viewer.set({ background: this.#scene().background ?? null }).catch(() => {});
+    if (!source) {
+      await hasBackground;
+      return mine === this.#opened ? this.#become("empty") : undefined;
+    }
     this.#become("loading");
     // The first picture has the right things in it.
     const { info, dropped } = await viewer.open(source, { signal: life.signal, state: this.#scene(), request: this.#given });

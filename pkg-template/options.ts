@@ -90,7 +90,7 @@ export type Where = (batch: TetBatch) => ArrayLike<number>;
 export interface RefineOptions extends Need {
   /**
    * The field that errors and values speak of and that the mesh carries: its name (the first time step of that name), or
-   * its number in `info.fields`. Default: the first.
+   * its number in `info.fields`. Default: `info.firstField`.
    */
   field?: string | number;
   /** More needs. If they are given and nothing else is, they are the only ones. */

@@ -104,6 +104,21 @@ test("what was left out of a file is reported", async () => {
   assert.deepEqual((await build(await file("tets.vtk"))).report.notes, []);
 });
 
+test("a request that names no field is of the first that tells something", async () => {
+  const points = "POINTS 4 double\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+  const data = "POINT_DATA 4\nVECTORS u double\n0 1 2 3 4 5 6 7 8 9 10 11\nSCALARS p double 1\nLOOKUP_TABLE default\n20 21 22 23\n";
+  const source = new TextEncoder().encode(`# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n${points}${data}`);
+  const { bytes } = await build(source, { allFields: true });
+  const mt = await MultiTessellation.open(bytes);
+  const { name, min, max } = mt.info.fields[mt.info.firstField];
+  assert.deepEqual([name, min, max], ["p", 20, 23]);
+  for (const request of [undefined, {}, { error: 0 }, { needs: [{ error: 0 }] }]) {
+    const { field, scale, offset } = await mt.refine(request);
+    assert.deepEqual(Array.from(field, (value) => Math.round(value * scale + offset)).sort(), [20, 21, 22, 23]);
+  }
+  mt.free();
+});
+
 test("labels at cells, and parts that do not touch, become regions", async () => {
   const corners = [0, 5].flatMap((x) => [`${x} 0 0`, `${x + 1} 0 0`, `${x} 1 0`, `${x} 0 1`]);
   const cells = "CELLS 2 10\n4 0 1 2 3\n4 4 5 6 7\nCELL_TYPES 2\n10\n10\n";

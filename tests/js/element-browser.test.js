@@ -116,6 +116,16 @@ test("the element of the README draws what its attributes say, under a strict po
   await page.close();
 });
 
+test("before there is a volume, the background is the one that is asked for", async () => {
+  const { page } = await opened(`<tetralod-viewer background="light"></tetralod-viewer>`);
+  await page.waitForFunction(() => document.querySelector("tetralod-viewer").viewer !== undefined, undefined, { timeout: 60_000 });
+  const isLight = async (name) => Number.parseInt((await picture(page, name)).grid.slice(0, 2), 16) > 128;
+  assert.ok(await isLight("empty-light"));
+  await page.evaluate(() => document.querySelector("tetralod-viewer").setAttribute("background", "dark"));
+  assert.ok(!(await isLight("empty-dark")));
+  await page.close();
+});
+
 test("pointer, wheel and keys move it; scrolling past it does not", async () => {
   const { page, complaints } = await opened(`<tetralod-viewer src="model.mt" label="Bucky ball"></tetralod-viewer>`);
   await reach(page, "ready");

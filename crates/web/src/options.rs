@@ -84,15 +84,17 @@ pub fn asked(options: &JsValue, mt: &Mt, own: Option<&View>) -> Result<Asked, We
 
 fn parse(options: &JsValue, mt: &Mt, own: Option<&View>) -> Result<Asked, ReadError> {
     let info = mt.info();
-    let mut parser = Parser { info, regions: mt.regions(), own, asked: Asked::default() };
+    let first = info.first_field();
+    let asked = Asked { field: first, ..Asked::default() };
+    let mut parser = Parser { info, regions: mt.regions(), own, asked };
     if options.is_undefined() || options.is_null() {
-        parser.asked.request = parser.of_field(Need::within(0.0), 0).into();
-        parser.asked.units.push(info.fields[0].range());
+        parser.asked.request = parser.of_field(Need::within(0.0), first).into();
+        parser.asked.units.push(info.fields[first].range());
         return Ok(parser.asked);
     }
     let all = Given::new(options, String::new(), &NAMES)?;
     let needs = all.each("needs", &NAMES[..NEED])?;
-    parser.asked.field = parser.field(&all)?.unwrap_or(0);
+    parser.asked.field = parser.field(&all)?.unwrap_or(first);
     // A field alone is no need: it says which one is shown.
     if !all.has("needs") && !all.has("where") || LIMITS.iter().any(|name| all.has(name)) || all.has("regions")
     {
