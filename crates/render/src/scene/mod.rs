@@ -209,6 +209,9 @@ impl Scene {
         self.meet(session);
         let (is_stale, is_moved) = (std::mem::take(&mut self.is_stale), std::mem::take(&mut self.is_moved));
         if session.info().is_none() {
+            // The background is there before the volume.
+            let Look { pixel_ratio, .. } = self.look;
+            self.look = Look { pixel_ratio, ..look(&self.state, &Bounds::EMPTY) };
             return Ok(is_stale);
         }
         let shown = self.shown_regions(session)?;
