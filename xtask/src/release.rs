@@ -55,6 +55,8 @@ fn check_changes(changes: &str, version: &str) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::check_changes;
 
     #[test]
@@ -63,6 +65,24 @@ mod tests {
         assert!(check_changes("## 0.1.0\n", "0.1.0").is_ok());
         for wrong in ["## Unreleased: 0.1.0\n## 0.1.0\n", "## 0.1.01\n", "## 0.0.9\n## 0.1.0\n", ""] {
             assert!(check_changes(wrong, "0.1.0").is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn tests_name_own_crates_by_path_alone() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+        for folder in [".", "crates/io", "crates/build", "crates/render", "crates/bench", "cli"] {
+            let path = format!("{root}/{folder}/Cargo.toml");
+            let manifest = fs::read_to_string(&path).expect(&path);
+            let mut of_tests = manifest.lines().skip_while(|line| *line != "[dev-dependencies]").skip(1);
+            let own = of_tests
+                .by_ref()
+                .take_while(|line| !line.starts_with('['))
+                .filter(|line| line.starts_with("tetralod"));
+            for line in own {
+                // With a version, crates need each other, and none of them can be published first.
+                assert!(line.contains("path = ") && !line.contains("version"), "{path}: {line}");
+            }
         }
     }
 }
