@@ -6,6 +6,7 @@ use super::styles::{quantity, scale};
 use super::{SceneError, SceneState};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::iter;
 use tetralod::geom::{Bounds, SingleValues};
 use tetralod::mesh::NONE;
 use tetralod::mt::{MeshChanges, MtInfo, Regions, numbers_of};
@@ -64,7 +65,7 @@ impl Current {
             Some((apart.len(), [tets, neighbors]))
         });
         if had_some || self.compared.is_some() {
-            self.changes.tets = vec![0..mesh.tets.len() as u32];
+            self.changes.tets = iter::once(0..mesh.tets.len() as u32).collect();
         }
     }
 
