@@ -1878,6 +1878,7 @@ test("two files are looked at with fingers on a phone", async () => {
   assert.ok(box.width > 150 && box.height > 150, JSON.stringify(box));
   await page.touchscreen.tap(box.x + box.width / 2, box.y + box.height / 2);
   await page.locator(".card").waitFor({ timeout: PATIENCE });
+  assert.deepEqual(await page.locator(".card dt:visible").allInnerTexts(), ["density", "… beside"]);
   await screenshot(page, "page-beside-phone");
   assert.deepEqual(page.complaints, []);
   await page.close();
