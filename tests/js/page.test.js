@@ -1814,6 +1814,10 @@ test("a file is chosen to be beside by address, by a drop and from the gallery, 
   assert.match(await page.innerText("#growth-beside"), /^no-such\.mt: .*404/);
   assert.equal(await demo(page, "state"), "complete", "the other one stays");
   page.complaints.length = 0;
+  await page.route("**/no-such.mt", (route) => route.continue({ url: new URL(SMALL, address()).href }));
+  await page.click("#retry-beside");
+  await reachBeside(page, "complete");
+  assert.ok(await page.isHidden("#retry-beside"));
 
   await press(page, "b");
   await page.locator("#gallery-list button").first().click();
