@@ -239,6 +239,8 @@ export interface Legend {
   colours: string[];
   /** The ends of the range, and round numbers between them, ascending; `fraction` is where the tick is in the range, 0 to 1. */
   ticks: { value: number; label: string; fraction: number }[];
+  /** Of the difference to a mesh of another file: so many points of the mesh are outside of that one. They have no value, and their tetrahedra are not shown. */
+  apart: number;
 }
 
 /** What is at a point. */

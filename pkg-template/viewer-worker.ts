@@ -6,7 +6,7 @@ import type { Update } from "./latest.js";
 import { type Unchecked, received } from "./options.js";
 import { Parts } from "./parts.js";
 import type { RangesOptions } from "./ranges.js";
-import type { BlockMap, Mesh, Progress } from "./results.js";
+import type { BlockMap, FieldInfo, Mesh, Progress } from "./results.js";
 import { ownEndpoint, serve } from "./rpc.js";
 import type { Reading, SceneState, ViewerChanges } from "./scene.js";
 import { type Loaded, type WasmSource, wasmError, wasmOf } from "./start.js";
@@ -46,6 +46,30 @@ const device = () => {
   const { viewer } = on();
   return { renderer: viewer.renderer as RendererName, adapter: viewer.adapter(), isSoftware: viewer.isSoftware };
 };
+
+/** A mesh of another viewer, with values in the units of its fields. */
+export interface Kept {
+  positions: Float64Array;
+  tets: Uint32Array;
+  fields: { name: string; time: number | undefined; values: Float64Array }[];
+  reach: number;
+}
+
+/** The fields of a volume that such a mesh has, by their numbers, and their values, one behind the other. */
+function keptFields(own: readonly Pick<FieldInfo, "name" | "time">[], kept: Kept["fields"]): [numbers: Uint32Array, values: Float64Array] {
+  const found = own.flatMap(({ name, time }, number) => {
+    const same = kept.find((one) => one.name === name && one.time === time);
+    return same ? [{ number, values: same.values }] : [];
+  });
+  const length = found.reduce((sum, { values }) => sum + values.length, 0);
+  const all = new Float64Array(length);
+  let at = 0;
+  for (const { values } of found) {
+    all.set(values, at);
+    at += values.length;
+  }
+  return [Uint32Array.from(found, ({ number }) => number), all];
+}
 
 /** What a viewer draws with. */
 export type RendererName = "webgpu" | "webgl";
@@ -273,8 +297,10 @@ const methods = {
     return region;
   },
 
-  keep() {
-    on().viewer.keep();
+  keep(other?: Kept) {
+    const { viewer } = on();
+    if (other) viewer.keepOther(other.positions, other.tets, ...keptFields(viewer.info()?.fields ?? [], other.fields), other.reach);
+    else viewer.keep();
     invalidate();
   },
 

@@ -343,7 +343,8 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
       if (this.#cover) this.#cover.style.cssText = coverStyle(this.#canvas);
       this.#size = [Math.max(1, w), Math.max(1, h)];
-      this.#change({ size: [...this.#size, devicePixelRatio] });
+      // A viewer that is freed has no size.
+      this.#change({ size: [...this.#size, devicePixelRatio] }).catch(() => {});
     });
     try {
       this.#observer.observe(this.#canvas, { box: "device-pixel-content-box" });
@@ -638,8 +639,22 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
    * await viewer.refine({ error: "1%" });
    * await viewer.set({ compare: { at: 0.5 } }); // coarse on the left, fine on the right
    */
-  async keep(): Promise<void> {
-    await this.#remote.call("keep", []);
+  async keep(): Promise<void>;
+  /**
+   * Keeps the mesh of another viewer, as its `mesh` gives it: with `compare: { at: 0, difference: true }` the mesh is coloured by its field
+   * minus that of the other one, where that has a field of the same name and time. Nothing else is drawn of the other mesh. Points farther than
+   * `reach` outside of it (in model units; any distance without it) have no value, and their tetrahedra are not shown: `legend.apart` counts
+   * them. Points outside that are nearer are compared with its boundary. What is shown is right within the sum of both errors.
+   *
+   * @example
+   * await viewer.keep(await other.mesh({ fields: ["p"] }), { reach: 0.01 });
+   * await viewer.set({ compare: { at: 0, difference: true } });
+   * @throws {TetralodError} `bad-option` if it is no mesh
+   */
+  async keep(mesh: Pick<Mesh, "positions" | "origin" | "tets" | "fields">, how?: { reach?: number }): Promise<void>;
+  async keep(mesh?: Pick<Mesh, "positions" | "origin" | "tets" | "fields">, how: { reach?: number } = {}): Promise<void> {
+    checkNames(how, ["reach"]);
+    await this.#remote.call("keep", mesh ? [{ ...keptOf(mesh), reach: how.reach ?? Infinity }] : []);
   }
 
   /**
@@ -793,6 +808,16 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
   [DISPOSE](): void {
     this.free();
   }
+}
+
+/** Absolute numbers of a mesh: positions, and the values of its fields. */
+function keptOf(mesh: Pick<Mesh, "positions" | "origin" | "tets" | "fields">) {
+  const { positions, tets, fields } = absolute(mesh);
+  return {
+    positions: Float64Array.from(positions),
+    tets,
+    fields: fields.map(({ name, time, values }) => ({ name, time, values: Float64Array.from(values) })),
+  };
 }
 
 /** An error of the file's contents says which file. */

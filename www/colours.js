@@ -5,6 +5,7 @@ import { percentilesAtAllTimes, shownField } from "./fields.js";
 import { precise } from "./format.js";
 import { demo, viewer } from "./page.js";
 import { store } from "./state.js";
+import { commonRange } from "./volume.js";
 
 /** The fractions of the volume between which the range of percentiles lies. */
 const PERCENTILES = [0.02, 0.98];
@@ -40,7 +41,7 @@ export function gradient({ colours, range, log }) {
 function choose() {
   if (!demo.info) return;
   const mine = ++chosen;
-  const { min, max } = shownField();
+  const [min, max] = commonRange(shownField().name);
   const { range: wanted } = store.state;
   const most = Math.max(Math.abs(min), Math.abs(max));
   if (Array.isArray(wanted)) take(wanted);
@@ -113,5 +114,5 @@ export function attachColours(onLate) {
     store.change({ range: value === "data" || value === "percentiles" || value === "symmetric" ? value : range });
   });
   for (const id of ["range-low", "range-high"]) input(id).addEventListener("input", typed);
-  store.subscribe(["range", "log", "field", "time"], choose);
+  store.subscribe(["range", "log", "field", "time", "met"], choose);
 }

@@ -29,16 +29,17 @@ export async function compose(picture, { width, height, canvas }) {
   const context = made.getContext("2d");
   if (!context) return picture;
   context.drawImage(await createImageBitmap(picture), 0, 0);
-  context.drawImage(await overlay(width, height), 0, 0, width, height);
+  const isBeside = canvas.id !== "canvas";
+  context.drawImage(await overlay(svg(isBeside ? "overlay-beside" : "overlay"), width, height), 0, 0, width, height);
   const scale = width / canvas.clientWidth;
   context.scale(scale, scale);
-  legend(context, canvas.getBoundingClientRect());
+  // Both have the colours in common.
+  if (!isBeside) legend(context, canvas.getBoundingClientRect());
   return made.convertToBlob({ type: "image/png" });
 }
 
-/** The overlay of the page as an image of this size. @param {number} width @param {number} height */
-async function overlay(width, height) {
-  const shown = svg("overlay");
+/** An overlay of the page as an image of this size. @param {SVGSVGElement} shown @param {number} width @param {number} height */
+async function overlay(shown, width, height) {
   const copy = /** @type {SVGSVGElement} */ (shown.cloneNode(true));
   const [from, to] = [shown, copy].map((svg) => [...svg.querySelectorAll("*")]);
   for (const [i, element] of from.entries()) {
@@ -54,6 +55,16 @@ async function overlay(width, height) {
   image.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(copy))}`;
   await image.decode();
   return image;
+}
+
+/** Two pictures beside each other, as a PNG. @param {Blob} left @param {Blob} right */
+export async function joined(left, right) {
+  const [one, other] = await Promise.all([left, right].map((picture) => createImageBitmap(picture)));
+  const made = new OffscreenCanvas(one.width + other.width, Math.max(one.height, other.height));
+  const context = made.getContext("2d");
+  context?.drawImage(one, 0, 0);
+  context?.drawImage(other, one.width, 0);
+  return made.convertToBlob({ type: "image/png" });
 }
 
 /** Draws the colour bar where the page has it. @param {OffscreenCanvasRenderingContext2D} context @param {DOMRect} stage */

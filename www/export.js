@@ -1,7 +1,7 @@
 /** Files made of what is shown: the picture, the mesh, surfaces, probes. */
 
 import { absolute } from "tetralod/viewer";
-import { compose } from "./compose.js";
+import { compose, joined } from "./compose.js";
 import { isDeformed, saved } from "./deform.js";
 import { $, all, button, element, input, select } from "./dom.js";
 import { isovalue, shownField } from "./fields.js";
@@ -15,6 +15,7 @@ import { alongAlways, alongNow, legsOf, lengthOf, NAMES as PROBES } from "./path
 import { nameOf as nameOfPlane, placeOfPlane, plane, span } from "./planes.js";
 import { draw } from "./scene.js";
 import { volumeName } from "./source.js";
+import { store } from "./state.js";
 import { onTab } from "./tabs.js";
 import { coloursOf, csv, glb, ply, stl, vtk, vtu } from "./writers.js";
 
@@ -135,11 +136,19 @@ export function pictureSize(canvas) {
   return { width, height };
 }
 
+/** The picture of a viewer, with what lies over it if that is wanted. @param {import("tetralod/viewer").Viewer} from @param {HTMLCanvasElement} canvas */
+async function pictureOf(from, canvas) {
+  const size = pictureSize(canvas);
+  const picture = await from.screenshot(size);
+  return input("shot-overlay").checked ? compose(picture, { ...size, canvas }) : picture;
+}
+
 async function savePicture(/** @type {HTMLCanvasElement} */ canvas) {
   const { width, height } = pictureSize(canvas);
-  const picture = await viewer().screenshot({ width, height });
-  const all = input("shot-overlay").checked ? await compose(picture, { width, height, canvas }) : picture;
-  saveAs(fileName(`${width}x${height}`, "png"), [all], "image/png");
+  const picture = await pictureOf(viewer(), canvas);
+  const other = store.state.met && !store.state.subtracted ? demo.beside?.viewer : undefined;
+  const all = other ? await joined(picture, await pictureOf(other, $("canvas-beside", HTMLCanvasElement))) : picture;
+  saveAs(fileName(`${other ? 2 * width : width}x${height}`, "png"), [all], "image/png");
 }
 
 /** Runs what a button is for, which may take a while. @param {HTMLButtonElement} button @param {() => Promise<unknown>} act */

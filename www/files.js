@@ -4,20 +4,28 @@ import { takeMesh } from "./build.js";
 import { $, dialog, input } from "./dom.js";
 import { say } from "./messages.js";
 import { open, openBuilt } from "./opening.js";
+import { source, wordsOf } from "./source.js";
+import { store } from "./state.js";
 
 /** How an MT file begins. */
 const START = [0x89, 0x54, 0x4c, 0x4f, 0x44, 0x0d, 0x0a, 0x1a];
 
 /** @typedef {import("./source.js").Dropped} Dropped */
 
-/** Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of. @param {Dropped[]} files */
-export async function takeFiles(files) {
+/**
+ * Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of.
+ *
+ * @param {Dropped[]} files
+ * @param {boolean} isForBeside whether they are shown beside what is open
+ */
+export async function takeFiles(files, isForBeside = source.isForBeside) {
   if (files.length === 0) return;
   dialog("gallery").close();
   const [{ data }] = files;
   const isMt = files.every(({ name }) => /\.mt$/i.test(name)) || (files.length === 1 && (await beginsAsMt(data)));
-  if (isMt) open(data);
-  else takeMesh(files, (built) => openBuilt(built, files));
+  const show = (/** @type {File} */ file) => store.change({ beside: wordsOf(file) });
+  if (isMt) isForBeside ? show(data) : open(data);
+  else takeMesh(files, (built) => (isForBeside ? show(built) : openBuilt(built, files)));
 }
 
 /** Whether the content says that it is an MT file. One that cannot be read is for whoever opens it. @param {File} file */
@@ -81,6 +89,7 @@ export function attachFiles() {
     if (!carriesFile(event)) return;
     event.preventDefault();
     const files = event.dataTransfer ? droppedFiles(event.dataTransfer) : Promise.resolve([]);
-    files.then(takeFiles).catch((error) => say("What was dropped cannot be read", error));
+    const isForBeside = source.isForBeside || (event.target instanceof Element && event.target.closest("#stage-beside") !== null);
+    files.then((dropped) => takeFiles(dropped, isForBeside)).catch((error) => say("What was dropped cannot be read", error));
   });
 }

@@ -9,8 +9,9 @@ import { count, size, vtuBytes } from "./format.js";
 import { stateNow } from "./history.js";
 import { note, say } from "./messages.js";
 import { open } from "./opening.js";
-import { source } from "./source.js";
-import { read } from "./state.js";
+import { demo } from "./page.js";
+import { source, wordsOf } from "./source.js";
+import { read, store } from "./state.js";
 import { pictureOf, taken, takePicture } from "./thumbnails.js";
 
 const LIST = "data/volumes.json";
@@ -181,15 +182,27 @@ function card(volume) {
 }
 
 /** @param {Listed} volume */
-function openListed({ url, scene }) {
+const openListed = ({ url, scene }) => take(url, { url, ...read(scene) });
+
+/** Opens what was chosen: in place of the volume that is open, or beside it. @param {string} url @param {import("./state.js").Words} [words] */
+function take(url, words) {
+  const isBeside = source.isForBeside;
   dialog("gallery").close();
-  open(url, { url, ...read(scene) });
+  if (isBeside) store.change({ beside: wordsOf(url) });
+  else open(url, words);
 }
 
-export function openGallery() {
+/** @param {boolean} isForBeside whether what is chosen is shown beside the volume that is open */
+function showDialog(isForBeside) {
+  if (dialog("gallery").open || (isForBeside && !demo.info)) return;
+  source.isForBeside = isForBeside;
+  $("gallery-title").textContent = isForBeside ? "Compare with…" : "Gallery";
   readVolumes();
   dialog("gallery").showModal();
 }
+
+export const openGallery = () => showDialog(false);
+export const chooseBeside = () => showDialog(true);
 
 export function attachGallery() {
   $("volume").addEventListener("change", () => open(select("volume").value));
@@ -197,10 +210,9 @@ export function attachGallery() {
   $("open-url").addEventListener("submit", (event) => {
     event.preventDefault();
     const url = input("url").value.trim();
-    if (!url) return;
-    dialog("gallery").close();
-    open(url);
+    if (url) take(url);
   });
+  dialog("gallery").addEventListener("close", () => (source.isForBeside = false));
   // A new volume may be there when the user comes back.
   window.addEventListener("focus", () => source.open !== undefined && readVolumes());
 }

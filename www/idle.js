@@ -34,6 +34,7 @@ function reasons() {
     "also-flow": noVectors,
     "map-blocks": isWhole,
     "map-missing": isWhole,
+    keep: store.state.beside !== "" && "The file beside is compared with",
     csv: store.state.probes.length === 0 && none,
   };
 }
@@ -55,4 +56,5 @@ export function showIdle() {
   for (const option of all("#colour-by [value=block], #colour-by [value=missing]")) setIdle(option, others["map-blocks"]);
 }
 
-export const attachIdle = () => store.subscribe(["view", "also", "opacities", "shape", "field", "kept", "difference", "probes"], showIdle);
+export const attachIdle = () =>
+  store.subscribe(["view", "also", "opacities", "shape", "field", "kept", "difference", "subtracted", "beside", "probes"], showIdle);

@@ -3,7 +3,7 @@
 import { toggleDeformation } from "./deform.js";
 import { $, dialog, element, named } from "./dom.js";
 import { toggleExtremes } from "./extremes.js";
-import { openGallery } from "./gallery.js";
+import { chooseBeside, openGallery } from "./gallery.js";
 import { redo, share, undo } from "./history.js";
 import { hideMessage } from "./messages.js";
 import { page } from "./page.js";
@@ -52,6 +52,7 @@ const TABLE = {
     { keys: ["C"], what: "cut cells at the ends of the range that is shown, or show whole ones", act: toggleCut },
     { keys: ["I"], what: "to the isovalue", act: () => toControl("isovalue") },
     { keys: ["O"], what: "gallery and files", act: openGallery },
+    { keys: ["B"], what: "compare with another file", act: chooseBeside },
     { keys: ["G"], what: "settings", act: () => showTab("settings") },
     { keys: ["N"], what: "data: what has arrived", act: () => showTab("data") },
     { keys: ["X"], what: "export", act: () => showTab("export") },

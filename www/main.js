@@ -5,6 +5,7 @@
  * - `store`, `state`, `history`: what is set, in one store; its words; the address, undo and redo, which are made of it
  * - `page`, `volume`, `source`: what has come of the volume, what it has, where it comes from
  * - `opening`, `fitting`, `gallery`, `thumbnails`, `files`, `build`, `repair`: opening a volume, from the list or of the user; what of the settings fits it
+ * - `beside`, `linked`: a second file beside it, and what that is shown with
  * - `parts`, `planes`, `fields`, `play`, `region`, `regions`, `request`: controls, and what is asked of the mesh
  * - `scene`, `colours`, `curve`, `transfer`, `histogram`, `bins`, `flow`, `compare`, `theme`: how it looks
  * - `camera`, `controls`, `picture`, `keys`, `tabs`: where it is looked from; mouse, touch and keys
@@ -18,6 +19,7 @@
  * checked strictly (`tests/js/tsconfig.page.json`).
  */
 
+import { attachBeside } from "./beside.js";
 import { attachBlockMap } from "./blockmap.js";
 import { attachCamera, lookFrom } from "./camera.js";
 import { attachColours } from "./colours.js";
@@ -90,12 +92,15 @@ async function start() {
   viewer.addEventListener("legend", ({ detail }) => showLegend(detail));
   viewer.addEventListener("error", ({ detail }) => fail(detail));
   attachOverlay(viewer);
-  attachControls(canvas, viewer, {
+  const actions = {
     onHome: () => viewer.home(),
-    onBox: (box) => hold(box.then(boxWasDragged)),
+    onBox: (/** @type {Promise<number[]>} */ box) => hold(box.then(boxWasDragged)),
     onClick: clicked,
-    onHover: (point, place) => demo.info && page.probes.hover(point, place),
     onLeave: () => page.probes.leave(),
+  };
+  attachControls(canvas, viewer, {
+    ...actions,
+    onHover: (point, place) => demo.info && page.probes.hover(point, place),
     onSpan: spanBox,
     isFlying: () => store.state.fly,
   });
@@ -118,6 +123,7 @@ async function start() {
   attachColours(draw);
   for (const attach of [attachCamera, attachRegion, attachRequest, attachScene, attachHandles, attachEmpty, attachIdle, attachPicture, attachExtremes])
     attach();
+  attachBeside(actions);
   attachFiles();
   attachHistory();
   attachGallery();
@@ -196,19 +202,27 @@ function showDevice({ adapter, isSoftware, renderer }) {
 function attachOverlay(viewer) {
   const covered = [$("legend")];
   page.overlay = new OverlayView(svg("overlay"), { covered, onSide: lookFrom });
+  page.overlayBeside = new OverlayView(svg("overlay-beside"), { covered: [$("growth-beside")], onSide: lookFrom });
   page.probes = new Probes();
   viewer.addEventListener("overlay", ({ detail }) => (page.overlay.data = detail));
-  store.subscribe(["axes"], () => (page.overlay.showsAxes = store.state.axes));
-  store.subscribe(["unit"], () => (page.overlay.unit = store.state.unit));
+  for (const overlay of [page.overlay, page.overlayBeside]) {
+    store.subscribe(["axes"], () => (overlay.showsAxes = store.state.axes));
+    store.subscribe(["unit"], () => (overlay.unit = store.state.unit));
+  }
   $("unpin").addEventListener("click", () => page.probes.clear());
   $("box-of-pins").addEventListener("click", () => useBox(page.probes.boxOf(...page.probes.pins.map(({ position }) => position))));
 }
 
-/** A click on the picture, or its key: a seed of a streamline on the plane in the view of the flow, a probe in all others. @param {Point} point */
-async function clicked(point) {
+/**
+ * A click on a picture, or its key: a seed of a streamline on the plane in the view of the flow, a probe in all others.
+ *
+ * @param {Point} point
+ * @param {import("tetralod/viewer").Viewer} [from] whose picture it is
+ */
+async function clicked(point, from) {
   if (!demo.info) return;
   try {
-    announce(mode() === "flow" ? seed(point) : ((await page.probes.pin(point)) ?? "Nothing is shown there"), 0);
+    announce(mode() === "flow" ? seed(point) : ((await page.probes.pin(point, from)) ?? "Nothing is shown there"), 0);
   } catch (error) {
     fail(error);
   }

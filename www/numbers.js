@@ -3,14 +3,15 @@
 import { $, all, announce, element } from "./dom.js";
 import { noteEmpty, showEmpty } from "./empty.js";
 import { refreshExtremes } from "./extremes.js";
-import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./format.js";
+import { count, milliseconds, nameOf, percentage, pixels, size, vtuBytes } from "./format.js";
 import { showHistogram } from "./histogram.js";
 import { showIdle } from "./idle.js";
 import { refreshMeasures } from "./measures.js";
 import { fail } from "./messages.js";
 import { demo, page, viewer } from "./page.js";
 import { budget, errorPixels } from "./request.js";
-import { originOf } from "./source.js";
+import { originOf, source } from "./source.js";
+import { store } from "./state.js";
 
 /** @param {import("tetralod/viewer").ViewerProgress} progress */
 export function showProgress({ bytes, total, complete, blocks }) {
@@ -28,10 +29,23 @@ export function showProgress({ bytes, total, complete, blocks }) {
   $("n-bytes").textContent = complete ? size(bytes) : amount;
 }
 
+/**
+ * What a picture beside another one is of, and how good it is.
+ *
+ * @param {{ name: string, info?: { tetrahedra: number } | undefined, stats?: import("./page.js").Stats | undefined }} shown
+ * @param {string[]} more
+ */
+export function pictureWords({ name, info, stats }, more = []) {
+  const whole = info ? `${count(info.tetrahedra)} tetrahedra` : "opening…";
+  const within = stats ? [`shown within ${percentage(100 * stats.relativeErrorBound)}`] : [];
+  return [element("b", {}, name), `: ${[whole, ...within, ...more].join(", ")}`];
+}
+
 /** How large the volume is, and how little of it has come; and what is not as fast as it could be. */
 export function showGrowth() {
-  const { info, totalBytes, receivedBytes } = demo;
+  const { info, stats, totalBytes, receivedBytes } = demo;
   if (!info) return;
+  if (store.state.beside) return $("growth").replaceChildren(...pictureWords({ name: nameOf(source.open ?? ""), info, stats }));
   const { vertices, tetrahedra } = info;
   const whole = totalBytes ? `${size(totalBytes)} as MT, ` : "";
   const arrived = element("b", {}, size(receivedBytes));
@@ -69,6 +83,7 @@ export function showStats(stats) {
   if (!stats.done) return;
   // The mesh is not complete while data is missing.
   if (!stats.missing) demo.stats = stats;
+  if (store.state.beside) showGrowth();
   page.probes.refresh();
   refreshExtremes();
   refreshMeasures();

@@ -59,7 +59,7 @@ export async function open(wanted, words) {
   stopHolding();
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined, request: undefined, blocks: undefined });
   Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
-  store.change({ playing: false, swinging: false, freeze: false, kept: false });
+  store.change({ playing: false, swinging: false, freeze: false, kept: false, subtracted: false });
   hideMessage();
   $("legend").hidden = true;
   $("loading").classList.remove("done");

@@ -21,6 +21,22 @@
  * @property {number} receivedBytes
  * @property {number} [totalBytes]
  * @property {import("tetralod").BlockProgress} [blocks] of a file that is fetched in blocks
+ * @property {Beside} [beside] the file that is compared with
+ */
+
+/**
+ * A second file, and the viewer that shows it.
+ *
+ * @typedef {object} Beside
+ * @property {"opening" | "streaming" | "complete" | "failed"} state
+ * @property {string} name
+ * @property {import("tetralod/viewer").Viewer} [viewer]
+ * @property {import("tetralod").MtInfo} [info]
+ * @property {Stats} [stats] of the last mesh
+ * @property {import("tetralod/viewer").ViewerRefineOptions} [request] the last one
+ * @property {import("tetralod/viewer").ViewerFrame} [frame]
+ * @property {{ code?: string, message: string }} [error]
+ * @property {string[]} missing what is shown of the other file, and this one does not have
  */
 
 /** @type {Demo} */
@@ -42,7 +58,8 @@ export function viewer() {
 /**
  * What is made once the viewer has started; `home` is the camera with which the volume is shown first.
  *
- * @type {{ home?: import("tetralod/viewer").CameraState, overlay: import("./overlay.js").OverlayView, probes: import("./probes.js").Probes,
+ * @type {{ home?: import("tetralod/viewer").CameraState, overlay: import("./overlay.js").OverlayView,
+ *   overlayBeside: import("./overlay.js").OverlayView, probes: import("./probes.js").Probes,
  *   transfer: import("./transfer.js").TransferEditor }}
  */
 export const page = /** @type {any} */ ({});

@@ -6,6 +6,7 @@
  */
 
 import { $, all, describe, element, select, shape, svg } from "./dom.js";
+import { pickBoth, readBoth } from "./beside.js";
 import { drawnAt } from "./deform.js";
 import { shownField } from "./fields.js";
 import { degrees, diagonalOf, precise, rounded } from "./format.js";
@@ -33,7 +34,7 @@ const MOST_FIELDS = 8;
 /** What another click is good for, by how many probes there are. */
 const HINTS = ["", "Click at a second point for a plot", "Click at a third point for an angle"];
 
-/** @typedef {import("tetralod/viewer").Reading} Probe */
+/** What is at a point, and what the file beside has there: nothing where it is not. @typedef {import("tetralod/viewer").Reading & { there?: import("tetralod/viewer").Reading }} Probe */
 /** @typedef {import("./volume.js").Point} Point */
 /** @typedef {import("./controls.js").Point} Spot */
 /** @typedef {import("./controls.js").Place} Place */
@@ -78,10 +79,21 @@ function partButtons({ region }) {
   return [button("Hide this part", (name) => setHidden([numberOf(name)], true)), button("Show it alone", (name) => showOnly([numberOf(name)]))];
 }
 
+/** Lines from one place of the picture to the next. @param {(import("./overlay.js").Pixels | undefined)[]} places */
+const linesBetween = (places) =>
+  places.slice(1).flatMap((to, i) => {
+    const from = places[i];
+    return from && to ? [shape("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], class: "between" })] : [];
+  });
+
+/** The mark of a probe. @param {import("./overlay.js").Pixels} place @param {number} i */
+const markAt = ([x, y], i) => [shape("circle", { cx: x, cy: y, r: MARK }), shape("text", { x, y: y + 4 }, NAMES[i])];
+
 export class Probes {
   /** Resolves when what is at the points of the state is read. */
   read = Promise.resolve();
   #marks = shape("g", { class: "pins" });
+  #beside = shape("g", { class: "pins" });
   /** What is at the points that are kept, as far as it is read. @type {Probe[]} */
   #pins = [];
   /** The points of which that is. @type {readonly Point[]} */
@@ -95,12 +107,15 @@ export class Probes {
   #plotted = 0;
   /** Draws the plot again when it has another size. @type {ResizeObserver | undefined} */
   #watch;
-  /** Where the pointer was last. @type {[point: Spot, place: Place] | undefined} */
+  /** Where the pointer was last, on the picture of which viewer. @type {[point: Spot, place: Place, from: import("tetralod/viewer").Viewer] | undefined} */
   #hovered;
 
   constructor() {
     svg("overlay").append(this.#marks);
+    svg("overlay-beside").append(this.#beside);
     page.overlay.follow(() => this.#place());
+    page.overlayBeside.follow(() => this.#placeBeside());
+    store.subscribe(["met"], () => this.refresh());
     store.subscribe(["probes"], () => {
       this.read = this.#follow();
     });
@@ -119,7 +134,7 @@ export class Probes {
     if (probes === this.#read) return;
     this.#show([], probes);
     if (probes.length === 0) return;
-    const found = await Promise.all(probes.map((point) => viewer().reading(point))).catch(() => undefined);
+    const found = await Promise.all(probes.map((point) => readBoth([...point]))).catch(() => undefined);
     if (!found || probes !== store.state.probes || !demo.info) return;
     // A point in a hole of the mesh has nothing.
     this.#keep(found.filter((one) => one !== undefined));
@@ -134,16 +149,14 @@ export class Probes {
     store.change({ probes: this.#read });
   }
 
-  /** The pointer is at a point of the canvas, (−1 to 1, y upwards), and at a place of the page. @param {Spot} point @param {Place} place */
-  hover(point, place) {
+  /** The pointer is at a point of the canvas of a viewer (−1 to 1, y upwards), and at a place of the page. @param {Spot} point @param {Place} place */
+  hover(point, place, from = viewer()) {
     clearTimeout(this.#resting);
-    this.#hovered = [point, place];
+    this.#hovered = [point, place, from];
     const mine = ++this.#asked;
     const ask = async () => {
       const start = performance.now();
-      const found = await viewer()
-        .pick(...point)
-        .catch(() => undefined);
+      const found = await pickBoth(from, point).catch(() => undefined);
       this.#took = performance.now() - start;
       if (mine === this.#asked && demo.info) this.#readOut(found, place);
     };
@@ -158,9 +171,9 @@ export class Probes {
     this.#readOut(undefined);
   }
 
-  /** Keeps the point that is shown at a point of the canvas. Resolves to what is said of it; nothing where nothing is. @param {Spot} point */
-  async pin(point) {
-    const found = await viewer().pick(...point);
+  /** Keeps the point that is shown at a point of the canvas. Resolves to what is said of it; nothing where nothing is. @param {Spot} point @param {import("tetralod/viewer").Viewer} from */
+  async pin(point, from = viewer()) {
+    const found = await pickBoth(from, point);
     if (!found || !demo.info) return undefined;
     this.#keep([...this.#pins, found].slice(-MOST_PINS));
     const words = all(".card:last-child dt").map((term) => `${term.textContent} ${term.nextElementSibling?.textContent}`);
@@ -177,13 +190,7 @@ export class Probes {
     const before = this.#pins;
     // While another volume is being opened, nothing is known of what is read.
     if (before.length === 0 || !demo.info) return;
-    const read = await Promise.all(
-      before.map(({ position }) =>
-        viewer()
-          .reading(position)
-          .catch(() => undefined),
-      ),
-    );
+    const read = await Promise.all(before.map(({ position }) => readBoth(position).catch(() => undefined)));
     if (before === this.#pins && demo.info)
       this.#show(
         read.map((found, i) => found ?? before[i]),
@@ -230,7 +237,7 @@ export class Probes {
     readout.hidden = !found;
     if (!found || !place) return;
     readout.replaceChildren(typeof found === "string" ? found : this.#list(found));
-    const stage = $("stage").getBoundingClientRect();
+    const stage = $("stages").getBoundingClientRect();
     const [x, y] = [place.x - stage.left, place.y - stage.top];
     const { offsetWidth, offsetHeight } = readout;
     // Beside the pointer, on the side where there is room.
@@ -240,13 +247,16 @@ export class Probes {
   }
 
   /** The position, the values and the tetrahedron of a point, as a list. @param {Probe} found */
-  #list({ position, values, size, error, region }) {
+  #list({ position, values, size, error, region, there }) {
     const list = element("dl");
     const byName = new Map([shownField(), ...volume().fields].map((field) => [field.name, field]));
     const fields = [...byName.values()];
     const diagonal = diagonalOf(volume().bounds);
     describe(list, [
-      ...fields.slice(0, MOST_FIELDS).map(({ name, min, max, unit }) => [name, `${rounded(values[name], max - min)} ${unit}`.trim()]),
+      ...fields.slice(0, MOST_FIELDS).flatMap(({ name, min, max, unit }) => {
+        const words = (/** @type {number | undefined} */ value) => (value === undefined ? "–" : `${rounded(value, max - min)} ${unit}`.trim());
+        return [[name, words(values[name])], ...(demo.beside?.info ? [["… beside", words(there?.values[name])]] : [])];
+      }),
       ...(fields.length > MOST_FIELDS ? [["", `and ${fields.length - MOST_FIELDS} more fields`]] : []),
       ...(region === undefined ? [] : [["part", region]]),
       ["position", withUnit(position.map((x) => rounded(x, diagonal)).join(", "))],
@@ -284,12 +294,10 @@ export class Probes {
 
   /** Draws the probes where they are seen now. */
   #place() {
+    this.#placeBeside();
     if (this.#pins.length === 0) return this.#marks.replaceChildren();
     const places = this.#pins.map((pin) => page.overlay.project(drawnAt(pin)));
-    const marks = places.slice(1).flatMap((to, i) => {
-      const from = places[i];
-      return from && to ? [shape("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], class: "between" })] : [];
-    });
+    const marks = linesBetween(places);
     const stage = $("cards");
     /** What a card should not cover: the legend, probes, and cards before it. @type {Box[]} */
     const taken = [...page.overlay.covered, ...places.flatMap((place) => (place ? [boxAt(place[0] - MARK, place[1] - MARK, 2 * MARK, 2 * MARK)] : []))];
@@ -298,7 +306,7 @@ export class Probes {
       card.hidden = !place;
       if (!place) continue;
       const [x, y] = place;
-      marks.push(shape("circle", { cx: x, cy: y, r: MARK }), shape("text", { x, y: y + 4 }, NAMES[i]));
+      marks.push(...markAt([x, y], i));
       const { offsetWidth: width, offsetHeight: height } = card;
       const held = (/** @type {number} */ at, /** @type {number} */ most) => Math.max(Math.min(at, most - 4), 4);
       const other = places[i === 0 ? 1 : i - 1];
@@ -313,6 +321,12 @@ export class Probes {
       taken.push(best);
     }
     this.#marks.replaceChildren(...marks);
+  }
+
+  /** The same in the picture of the file beside, without cards. */
+  #placeBeside() {
+    const places = this.#pins.map((pin) => page.overlayBeside.project(drawnAt(pin.there ?? pin)));
+    this.#beside.replaceChildren(...linesBetween(places), ...places.flatMap((place, i) => (place ? markAt(place, i) : [])));
   }
 
   /** Shows what is plotted of the probes, if there is anything to plot. */

@@ -39,6 +39,9 @@ function sphereIn(box) {
 /** Whether the region is a box, or the sphere in it. */
 const hasBox = () => ["box", "sphere"].includes(store.state.region);
 
+/** The box with handles in the picture. */
+export const boxWithHandles = () => (hasBox() ? store.state.box : undefined);
+
 /** The box outside of which everything is cut away; nothing without one. */
 export const cutBox = () => (hasBox() && store.state.inside ? store.state.box : undefined);
 

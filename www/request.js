@@ -10,7 +10,7 @@ import { areas } from "./region.js";
 import { FIRST, store } from "./state.js";
 
 /** What the request is made of. */
-const ASKED = /** @type {const} */ ([
+export const ASKED = /** @type {const} */ ([
   ...["refine", "error", "outside", "pixels", "budget", "focus", "isovalue", "field", "time"],
   ...["region", "part", "box", "view", "planes", "threshold", "over-time", "probes"],
 ]);
@@ -67,8 +67,8 @@ export function budget() {
   return Number((1000 * (most / 1000) ** (store.state.budget / 100)).toPrecision(2));
 }
 
-/** @returns {import("tetralod/viewer").ViewerRefineOptions} */
-function options() {
+/** What is asked for. @returns {import("tetralod/viewer").ViewerRefineOptions} */
+export function options() {
   const error = /** @type {const} */ (`${errorPercent()}%`);
   const needs = [];
   if (store.state.refine === "view") needs.push({ view: { pixels: errorPixels() } });

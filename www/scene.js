@@ -2,7 +2,7 @@
 
 import { averagedNote } from "./averaged.js";
 import { colours, gradient } from "./colours.js";
-import { comparison } from "./compare.js";
+import { comparison, differenceNote } from "./compare.js";
 import { pointsOf } from "./curve.js";
 import { deformation } from "./deform.js";
 import { $, element, text } from "./dom.js";
@@ -18,7 +18,7 @@ import { isByRegion, regionOpacities, shownRegions } from "./regions.js";
 import { store } from "./state.js";
 import { background } from "./theme.js";
 import { threshold } from "./threshold.js";
-import { rangeOf } from "./volume.js";
+import { commonRange } from "./volume.js";
 
 /** @typedef {import("tetralod/viewer").SceneState} SceneState */
 /** @typedef {import("tetralod/viewer").CellState} CellState */
@@ -59,7 +59,7 @@ export const LOOKS = /** @type {const} */ ([
     "reversed",
     "bands",
   ],
-  ...["range", "threshold", "threshold-cut", "log", "outline", "shade", "background", "dark", "kept", "split", "difference"],
+  ...["range", "threshold", "threshold-cut", "log", "outline", "shade", "background", "dark", "kept", "split", "difference", "met", "subtracted"],
 ]);
 
 /** The surface of the domain around other parts. */
@@ -113,6 +113,10 @@ function isByField() {
   return is[mode()] ?? (["volume", "slice", "solid"].includes(mode()) || beside().some((name) => is[name] ?? name !== "solid"));
 }
 
+/** What is drawn, as the settings say. */
+let drawn = {};
+export const scene = () => drawn;
+
 /** Draws what the settings say. */
 export function draw() {
   if (!demo.info) return;
@@ -139,14 +143,13 @@ export function draw() {
     outline,
     shade: shade / 100,
   };
-  viewer()
-    .set(Object.assign(nothing, ...parts, looks))
-    .catch(fail);
+  drawn = Object.assign(nothing, ...parts, looks);
+  viewer().set(drawn).catch(fail);
 }
 
 /** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. @param {string} name @returns {[number, number]} */
 function ownRange(name) {
-  const [min, max] = rangeOf(name);
+  const [min, max] = commonRange(name);
   const most = Math.max(-min, max);
   return min < 0 && max > 0 ? [-most, most] : [min, max];
 }
@@ -165,7 +168,7 @@ export function showLegend(legend) {
   const shown = [...ticks.filter(isEnd), ...ticks.filter((tick) => !isEnd(tick))].map(tickElement);
   $("legend-ticks").replaceChildren(...shown);
   leaveOutOverlaps(shown);
-  const note = averagedNote(demo.info?.fields.filter(({ name }) => name === label) ?? []);
+  const note = [...differenceNote(legend), ...averagedNote(demo.info?.fields.filter(({ name }) => name === label) ?? [])];
   $("legend-note").replaceChildren(...note.map((textContent) => element("span", { textContent })));
   $("legend-note").hidden = note.length === 0;
   refreshExtremes();

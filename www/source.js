@@ -11,9 +11,11 @@ const FILE = "file:";
  * What is open; what was opened last, perhaps in vain: the button "Try again" opens it again; and what is open where no address says
  * anything else.
  *
- * @type {{ open?: Source, tried?: Source, first: string }}
+ * `isForBeside`: whether what is chosen now is shown beside what is open.
+ *
+ * @type {{ open?: Source, tried?: Source, first: string, isForBeside: boolean }}
  */
-export const source = { first: "" };
+export const source = { first: "", isForBeside: false };
 /** Files of the user, by their names: undo may come back to them. @type {Map<string, File>} */
 const files = new Map();
 /** What MT files were built of by the page: in words, and its bytes. @type {WeakMap<File, { format: string, bytes: number }>} */
@@ -50,6 +52,17 @@ export const isNew = () => source.tried !== source.open || !demo.info;
 export function sourceWords() {
   const { open = "", first } = source;
   return open instanceof File ? `${FILE}${open.name}` : open === first ? "" : open;
+}
+
+/** What is meant by something that is to be shown beside what is open: words, as in the address of the page. @param {Source} wanted */
+export function wordsOf(wanted) {
+  if (!(wanted instanceof File)) return wanted;
+  const isFree = (/** @type {string} */ name) => [undefined, wanted].includes(files.get(name));
+  // Results of the same name in two folders are two files.
+  let { name } = wanted;
+  for (let number = 2; !isFree(name); number++) name = `${wanted.name} (${number})`;
+  files.set(name, wanted);
+  return `${FILE}${name}`;
 }
 
 /** The name of a file that is part of an address, if that is one of a file. @param {string} words */

@@ -72,12 +72,13 @@ const [FLAGS, SLIDERS, CHOICES] = /** @type {const} */ ([
  * @property {string} part the path of the region, or of the branch of regions, that is refined where that is asked for
  * @property {readonly Point[]} seeds that were placed by clicks
  * @property {readonly Point[]} probes
+ * @property {string} beside the words of the file that is compared with; empty without one
  * @property {Camera | undefined} camera that with which the volume is shown first without it
  */
 
 /**
  * @typedef {Record<(typeof FLAGS)[number], boolean> & Record<(typeof SLIDERS)[number], number> & Record<(typeof CHOICES)[number], string>
- *   & Others & { playing: boolean, swinging: boolean, dark: boolean, kept: boolean }} State
+ *   & Others & { playing: boolean, swinging: boolean, dark: boolean, kept: boolean, met: boolean, subtracted: boolean }} State
  */
 
 /** Words of the address: `get` gives none for what there is first, `set` never gets none and tells whether they mean something. */
@@ -357,6 +358,21 @@ const ENTRIES = {
   unit: control("unit"),
   fly: control("fly"),
   "frame-time": control("frame-time"),
+  beside: {
+    get: ({ beside }) => beside,
+    set(words, draft) {
+      Object.assign(draft, { beside: words, difference: false });
+      return true;
+    },
+  },
+  // A mesh that is kept is in no link.
+  difference: {
+    get: ({ beside, difference }) => (beside && difference ? "1" : ""),
+    set(words, draft) {
+      draft.difference = words === "1" && draft.beside !== "";
+      return draft.difference;
+    },
+  },
   time: {
     get: ({ time }) => (time === 0 ? "" : String(time)),
     set(words, draft) {
@@ -476,12 +492,23 @@ export const FIRST = {
   "part-opacities": {},
   seeds: [],
   probes: [],
+  beside: "",
   camera: undefined,
 };
 
 /** The one that the page has. @type {Store<State>} */
 export const store = new Store(
-  /** @type {State} */ ({ ...loaded, ...FIRST, field: "", part: "", box: [0, 0, 0, 1, 1, 1], playing: false, swinging: false, dark: true, kept: false }),
+  /** @type {State} */ ({
+    ...loaded,
+    ...FIRST,
+    field: "",
+    part: "",
+    box: [0, 0, 0, 1, 1, 1],
+    playing: false,
+    swinging: false,
+    dark: true,
+    ...{ kept: false, met: false, subtracted: false },
+  }),
   settled,
 );
 

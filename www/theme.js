@@ -32,7 +32,7 @@ export function switchTheme() {
 
 function showTheme() {
   document.documentElement.style.colorScheme = chosen ?? "";
-  $("stage").dataset.background = background();
+  for (const stage of ["stage", "stage-beside"]) $(stage).dataset.background = background();
 }
 
 export function attachTheme() {

@@ -1,7 +1,7 @@
 /** What the volume that is open has: fields and their times, vectors, and boxes in it. */
 
 import { diagonalOf, precise } from "./format.js";
-import { volume } from "./page.js";
+import { demo, volume } from "./page.js";
 
 /** @typedef {import("tetralod").FieldInfo} FieldInfo */
 /** @typedef {[number, number, number]} Point */
@@ -26,6 +26,12 @@ export function stepsOf(name) {
 /** The smallest and the largest value of a field at all of its times. @param {string} name @returns {[number, number]} */
 export function rangeOf(name) {
   const steps = volume().fields.filter((field) => field.name === name);
+  return [Math.min(...steps.map(({ min }) => min)), Math.max(...steps.map(({ max }) => max))];
+}
+
+/** The same of both files, where the one beside has the field, too. @param {string} name @returns {[number, number]} */
+export function commonRange(name) {
+  const steps = [...volume().fields, ...(demo.beside?.info?.fields ?? [])].filter((field) => field.name === name);
   return [Math.min(...steps.map(({ min }) => min)), Math.max(...steps.map(({ max }) => max))];
 }
 

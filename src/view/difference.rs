@@ -40,6 +40,14 @@ impl Difference {
     /// # Panics
     /// If a mesh names a point or a neighbour that it does not have.
     pub fn of(mesh: &MeshView<'_>, other: MeshView<'_>) -> Option<Self> {
+        Self::within(mesh, other, f64::INFINITY)
+    }
+
+    /// The same, but the value is NaN at points that are farther than `reach` outside of `other`. Then the mean square is NaN, too.
+    ///
+    /// # Panics
+    /// As [`Difference::of`].
+    pub fn within(mesh: &MeshView<'_>, other: MeshView<'_>, reach: f64) -> Option<Self> {
         if other.tets.is_empty() {
             return None;
         }
@@ -53,7 +61,9 @@ impl Difference {
                 Some(place) => place.value(&other),
                 None => {
                     outside += 1;
-                    boundary.get_or_insert_with(|| Boundary::of(&other)).as_ref()?.nearest_value(*p)
+                    let boundary = boundary.get_or_insert_with(|| Boundary::of(&other)).as_ref()?;
+                    let (value, distance) = boundary.nearest(*p);
+                    if distance > reach { f64::NAN } else { value }
                 }
             };
             values.push(own - there);
@@ -83,14 +93,15 @@ impl Boundary {
         is_usable.then(|| Self { surface, grid: TriangleGrid::new(corners) })
     }
 
-    /// The value of the field at the nearest point; NaN if that is not known.
-    fn nearest_value(&self, p: [f64; 3]) -> f64 {
+    /// The value of the field at the nearest point, and how far away that is; both NaN if it is not known.
+    fn nearest(&self, p: [f64; 3]) -> (f64, f64) {
         let p = DVec3::from(p);
         let Some((triangle, at)) = p.is_finite().then(|| self.grid.nearest(p)).flatten() else {
-            return f64::NAN;
+            return (f64::NAN, f64::NAN);
         };
         let weights = weights_on_triangle(at, self.grid.corners[triangle as usize]);
         let vertices = self.surface.indices[triangle as usize];
-        (0..3).map(|i| weights[i] * self.surface.values[vertices[i] as usize]).sum()
+        let value = (0..3).map(|i| weights[i] * self.surface.values[vertices[i] as usize]).sum();
+        (value, p.distance(at))
     }
 }

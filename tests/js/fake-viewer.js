@@ -108,6 +108,8 @@ export class Viewer extends EventTarget {
       done: true,
       satisfied: true,
       relativeErrorBound: 0.01,
+      fieldBound: 0.09,
+      boundaryBound: 0,
       bounds: [0.01],
       bytes: 1000,
     });
@@ -150,7 +152,9 @@ export class Viewer extends EventTarget {
   surface = async () => ({ positions: [], values: [], indices: [] });
   pickRegion = async () => -1;
   pan = async () => {};
+  mesh = async () => ({ positions: [], tets: [], fields: [] });
   keep = async () => {};
+  free = () => {};
   freeze = async () => {};
   settled = async () => {};
   blockMap = async () => undefined;

@@ -1692,3 +1692,198 @@ test("on a phone the card of a probe stays in the picture", async () => {
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
+
+/** Two MTs of one input. */
+const [ONE, OTHER] = ["data/sphere-flow.mt", "data/sphere-flow-vertex.mt"];
+
+/** What the page has of the file beside, and of what both viewers show. */
+const bothShown = (page) =>
+  page.evaluate(() => {
+    const { viewer, request, beside } = window.tetralodDemo;
+    const of = ({ state, legend, info }) => ({ camera: state.camera, clips: state.clips, isosurfaces: state.isosurfaces, legend, name: info.kind });
+    return { here: of(viewer.state ? viewer : {}), there: of(beside.viewer), request, other: beside.request, state: beside.state };
+  });
+
+const reachBeside = (page, state) =>
+  page
+    .waitForFunction((wanted) => window.tetralodDemo.beside?.state === wanted, state, { timeout: PATIENCE })
+    .catch(async () => {
+      const { viewer, ...beside } = await page.evaluate(() => ({ ...window.tetralodDemo.beside, viewer: undefined }));
+      assert.fail(`the file beside is not ${state}: ${JSON.stringify(beside)} ${page.complaints}`);
+    });
+
+/** Waits until both viewers are at rest. */
+async function settleBoth(page) {
+  await settle(page);
+  await page.evaluate((patience) => window.tetralodDemo.beside.viewer.settled({ signal: AbortSignal.timeout(patience) }), PATIENCE);
+}
+
+for (const renderer of ["webgpu", "webgl"]) {
+  test(`two files are beside each other with linked cameras and settings, in ${renderer}`, async () => {
+    const page = await newPage(COARSE);
+    page.complaints = [];
+    page.on("pageerror", (error) => page.complaints.push(String(error)));
+    page.on("console", (message) => message.type() === "error" && page.complaints.push(message.text()));
+    await page.goto(`${address()}?renderer=${renderer}#url=${ONE}&view=solid&error=60&beside=${OTHER}`);
+    await reach(page, "complete");
+    await reachBeside(page, "complete");
+    await settleBoth(page);
+    const names = await page.evaluate(() => [window.tetralodDemo.viewer.renderer, window.tetralodDemo.beside.viewer.renderer]);
+    assert.deepEqual(names, [renderer, renderer]);
+    assert.match(await page.innerText("#growth"), /^sphere-flow\.mt: [\d,]+ tetrahedra, shown within [\d.]+ %$/);
+    assert.match(await page.innerText("#growth-beside"), /^sphere-flow-vertex\.mt: [\d,]+ tetrahedra, shown within [\d.]+ %$/);
+    const [left, right] = await Promise.all(["#canvas", "#canvas-beside"].map((id) => page.locator(id).boundingBox()));
+    assert.ok(Math.abs(left.width - right.width) < 2 && left.height === right.height && right.x >= left.x + left.width, JSON.stringify([left, right]));
+
+    // The mouse and keys on either one move both.
+    const camera = async () => {
+      await settleBoth(page);
+      const { here, there } = await bothShown(page);
+      for (const [name, value] of Object.entries(here.camera)) assert.deepEqual(there.camera[name], value, name);
+      return here.camera;
+    };
+    const first = await camera();
+    await page.locator("#canvas-beside").focus();
+    await page.keyboard.press("ArrowLeft");
+    const second = await camera();
+    assert.notEqual(second.yaw, first.yaw);
+    await page.mouse.move(left.x + left.width / 2, left.y + left.height / 2);
+    await page.mouse.wheel(0, -200);
+    const third = await camera();
+    assert.ok(third.distance < second.distance);
+
+    // One range of colours, one plane, one error in units of the field.
+    await page.fill("#cut", "600");
+    await settleBoth(page);
+    const { here, there, request, other } = await bothShown(page);
+    assert.deepEqual(there.clips, here.clips);
+    assert.deepEqual(there.legend.range, here.legend.range);
+    const range = await page.evaluate((number) => {
+      const { min, max } = window.tetralodDemo.info.fields[number];
+      return max - min;
+    }, request.field);
+    assert.ok(Math.abs(other.error - (Number.parseFloat(request.error) / 100) * range) < 1e-9 * range, `${other.error} of ${range}`);
+
+    // A click in either one reads both.
+    for (const [i, box] of [right, left].entries()) {
+      await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+      await page.locator(".card").nth(i).waitFor({ timeout: PATIENCE });
+      const words = await page.locator(".card").nth(i).innerText();
+      assert.match(words, /… beside\s+[−\d]/);
+    }
+    assert.equal(await page.locator("#overlay-beside .pins circle").count(), 2);
+    const pins = await page.evaluate(() => location.hash);
+    await addressed(page, /probes=/);
+    assert.match(await page.evaluate(() => location.hash), /beside=data\/sphere-flow-vertex\.mt/, pins);
+    await screenshot(page, `page-beside-${renderer}`);
+    await press(page, "Escape");
+
+    // The difference, whose errors add up.
+    await page.locator("#difference").check();
+    await page.waitForFunction(() => /^difference of/.test(window.tetralodDemo.viewer.legend?.label), undefined, { timeout: PATIENCE });
+    await settleBoth(page);
+    const found = await page.evaluate(() => {
+      const { viewer, stats, beside } = window.tetralodDemo;
+      return { range: viewer.legend.range, apart: viewer.legend.apart, bound: stats.fieldBound + beside.stats.fieldBound };
+    });
+    // Both are of one input.
+    assert.ok(found.range[1] <= found.bound * (1 + 1e-6) && found.range[0] === -found.range[1], JSON.stringify(found));
+    assert.equal(found.apart, 0);
+    assert.match(await page.innerText("#legend-note"), /sphere-flow\.mt − sphere-flow-vertex\.mt\s*right within/);
+    assert.ok(await page.locator("#canvas-beside").isHidden());
+    await addressed(page, /difference=1/);
+    await screenshot(page, `page-beside-difference-${renderer}`);
+    await page.locator("#difference").uncheck();
+    await page.locator("#canvas-beside").waitFor();
+    await page.click("#not-beside");
+    await page.waitForFunction(() => window.tetralodDemo.beside === undefined && !/beside/.test(location.hash), undefined, { timeout: PATIENCE });
+    assert.ok(await page.isHidden("#stage-beside"));
+    assert.deepEqual(page.complaints, []);
+    await page.close();
+  });
+}
+
+test("a file is chosen to be beside by address, by a drop and from the gallery, and what it does not have is said", async () => {
+  const page = await open(SMALL, undefined, COARSE);
+  await reach(page, "complete");
+  await press(page, "b");
+  assert.equal(await page.innerText("#gallery-title"), "Compare with…");
+  await page.fill("#url", "data/no-such.mt");
+  await page.keyboard.press("Enter");
+  await reachBeside(page, "failed");
+  assert.match(await page.innerText("#growth-beside"), /^no-such\.mt: .*404/);
+  assert.equal(await demo(page, "state"), "complete", "the other one stays");
+  page.complaints.length = 0;
+  await page.route("**/no-such.mt", (route) => route.continue({ url: new URL(SMALL, address()).href }));
+  await page.click("#retry-beside");
+  await reachBeside(page, "complete");
+  assert.ok(await page.isHidden("#retry-beside"));
+
+  await press(page, "b");
+  await page.locator("#gallery-list button").first().click();
+  await reachBeside(page, "complete");
+  assert.match(await page.evaluate(() => location.hash), /beside=data/);
+  const other = await page.evaluate(() => ({
+    names: window.tetralodDemo.beside.info.fields.map(({ name }) => name),
+    own: window.tetralodDemo.info.fields[0].name,
+  }));
+  if (!other.names.includes(other.own)) assert.match(await page.innerText("#growth-beside"), new RegExp(`does not have ${other.own}`));
+
+  // The same file is the same.
+  const bytes = Array.from(await readFile(new URL(`../../www/${SMALL}`, import.meta.url)));
+  await page.evaluate((bytes) => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([new Uint8Array(bytes)], "bucky-small.mt"));
+    document.getElementById("canvas-beside")?.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true, bubbles: true }));
+  }, bytes);
+  await page.waitForFunction(() => window.tetralodDemo.beside?.name === "bucky-small.mt", undefined, { timeout: PATIENCE });
+  await reachBeside(page, "complete");
+  assert.equal(await page.evaluate(() => location.hash.includes("beside=file%3Abucky-small.mt")), true);
+  await settleBoth(page);
+  const hashes = await page.evaluate(() => Promise.all([window.tetralodDemo.viewer.hash(), window.tetralodDemo.beside.viewer.hash()]));
+  assert.equal(hashes[0], hashes[1]);
+  await page.locator("#difference").check();
+  await page.waitForFunction(() => window.tetralodDemo.viewer.legend?.label === "difference of density", undefined, { timeout: PATIENCE });
+  const check = await checker(page);
+  for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
+    await page.emulateMedia({ colorScheme });
+    await check(`the difference, ${colorScheme}`);
+  }
+  await page.locator("#difference").uncheck();
+  await page.locator("#canvas-beside").waitFor();
+  for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
+    await page.emulateMedia({ colorScheme });
+    await check(`two files, ${colorScheme}`);
+  }
+  // A picture has both.
+  const download = page.waitForEvent("download");
+  await page.locator("#tab-export").click();
+  await page.locator("#shot").click();
+  const [, width, height] = /-(\d+)x(\d+)\.png$/.exec((await download).suggestedFilename()) ?? [];
+  assert.ok(Number(width) > Number(height), `${width} x ${height}`);
+  // The difference and back are two steps, the file is the third one.
+  for (const step of ["difference=1", "file%3Abucky-small.mt$", "beside=data"]) {
+    await page.click("#undo");
+    await addressed(page, new RegExp(step));
+  }
+  await reachBeside(page, "complete");
+  assert.notEqual(await page.evaluate(() => window.tetralodDemo.beside.name), "bucky-small.mt");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("two files are looked at with fingers on a phone", async () => {
+  const page = await open(SMALL, undefined, PHONE);
+  await reach(page, "complete");
+  await page.evaluate(() => (location.hash = "#beside=data/bucky-small.mt"));
+  await reachBeside(page, "complete");
+  await settleBoth(page);
+  const box = await page.locator("#canvas-beside").boundingBox();
+  assert.ok(box.width > 150 && box.height > 150, JSON.stringify(box));
+  await page.touchscreen.tap(box.x + box.width / 2, box.y + box.height / 2);
+  await page.locator(".card").waitFor({ timeout: PATIENCE });
+  assert.deepEqual(await page.locator(".card dt:visible").allInnerTexts(), ["density", "… beside"]);
+  await screenshot(page, "page-beside-phone");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});

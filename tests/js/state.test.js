@@ -328,6 +328,58 @@ test("what is done in the picture is part of the state: probes, seeds, and the c
   await page.close();
 });
 
+test("a second file, and the difference to it, are part of the state, and are shown and asked for what the first one is", async () => {
+  const page = await open("#view=slice&error=25&beside=flow.mt");
+  const isBeside = () => page.waitForFunction(() => window.tetralodDemo.beside?.state === "complete", undefined, { timeout: PATIENCE });
+  await isBeside();
+  const both = () =>
+    page.evaluate(() => {
+      const { viewer, request, beside } = window.tetralodDemo;
+      const { clipBox, region, compare, ...there } = beside.viewer.state;
+      return { here: viewer.state, there, asked: [request, beside.request], compare };
+    });
+  const assertLinked = async () => {
+    await rest(page);
+    const { here, there, asked, compare } = await both();
+    for (const name of ["camera", "slices", "isosurfaces", "clips", "colours", "background", "threshold"]) assert.deepEqual(there[name], here[name], name);
+    assert.equal(compare, undefined);
+    // At all times from 1 to 12, of which this is one.
+    const { min, max } = await page.evaluate((number) => window.tetralodDemo.info.fields[number], asked[0].field);
+    assert.deepEqual([asked[1].field, asked[1].error], [asked[0].field, (Number.parseFloat(asked[0].error) / 100) * (max - min)]);
+    return asked[0];
+  };
+  await assertLinked();
+  for (const [id, value] of [
+    ["cut", "700"],
+    ["time", "2"],
+    ["error", "75"],
+  ])
+    await page.fill(`#${id}`, value);
+  await page.evaluate(() => window.tetralodDemo.viewer.orbit(0.5));
+  const asked = await assertLinked();
+  assert.notEqual(asked.field, 0);
+  const link = await page.evaluate(() => location.hash);
+  assert.match(link, /beside=flow\.mt/);
+  assert.ok(await page.isDisabled("#keep"), "the file beside is compared with");
+
+  await page.check("#difference");
+  await rest(page);
+  assert.equal(await page.evaluate(() => location.hash.includes("difference=1")), true);
+  assert.deepEqual((await both()).here.compare, { at: 0, difference: true });
+  await page.click("#undo");
+  await rest(page);
+  assert.deepEqual([await page.evaluate(() => location.hash), (await both()).here.compare], [link, undefined]);
+  await page.click("#not-beside");
+  await rest(page);
+  assert.ok((await page.isHidden("#stage-beside")) && (await page.isEnabled("#keep")));
+  await page.click("#undo");
+  await isBeside();
+  assert.equal(await page.evaluate(() => location.hash), link);
+  await assertLinked();
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
 test("parts whose names have steps are a tree, which is filtered, made translucent, measured and refined", async () => {
   const page = await open("?url=parts.mt");
   const [blades, vanes] = ["rotor/blade", "stator/vane"].map((name) => Array.from({ length: 12 }, (_, i) => `${name} ${i + 1}`));

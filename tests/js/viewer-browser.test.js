@@ -297,6 +297,50 @@ test("the legend comes again with a volume that is opened again", async () => {
   await page.close();
 });
 
+test("the field of another mesh is taken from this one where both are", async () => {
+  const page = await opened();
+  const found = await page.evaluate(async () => {
+    const { viewer } = window.tetralodDemo;
+    const mesh = await viewer.mesh({ fields: true });
+    const [low, , , high] = viewer.info.bounds;
+    const less = mesh.fields.map((field) => ({ ...field, values: field.values.map((value) => value - 2 / field.scale) }));
+    const aside = mesh.positions.map((x, i) => x + (i % 3 === 0 ? (high - low) / 2 : 0));
+    await viewer.set({ boundary: {}, compare: { at: 0, difference: true } });
+    const shown = async (other, how) => {
+      await viewer.keep(other, how);
+      // The picture that shows it.
+      await viewer.settled();
+      await viewer.screenshot({ width: 8, height: 8, samples: 1 });
+      const { label, range, apart } = viewer.legend;
+      return { label, range, apart };
+    };
+    const refused = async (other, how) =>
+      viewer.keep(other, how).then(
+        () => "",
+        ({ code }) => code,
+      );
+    return {
+      name: viewer.info.fields[0].name,
+      points: mesh.positions.length / 3,
+      same: await shown({ ...mesh, fields: less }),
+      half: await shown({ ...mesh, fields: less, positions: aside }, { reach: 0 }),
+      other: await shown({ ...mesh, fields: less.map((field) => ({ ...field, name: "another" })) }),
+      refused: [
+        await refused({ ...mesh, tets: Uint32Array.of(0, 1, 2, mesh.positions.length) }),
+        await refused(mesh, { reach: -1 }),
+        await refused(mesh, { far: 1 }),
+      ],
+    };
+  });
+  const { name, points, same, half, other, refused } = found;
+  assert.deepEqual([same.label, same.apart], [`difference of ${name}`, 0]);
+  assert.ok(Math.abs(same.range[1] - 2) < 1e-5 && same.range[0] === -same.range[1], `${same.range}`);
+  assert.ok(half.apart > 0 && half.apart < points, `${half.apart} of ${points}`);
+  assert.deepEqual([other.label, other.apart], [name, 0], "it has no such field");
+  assert.deepEqual(refused, ["bad-option", "bad-option", "bad-option"]);
+  await page.close();
+});
+
 test("a request that is given up leaves the one before it", async () => {
   const page = await opened();
   await page.evaluate(CODES);

@@ -62,6 +62,21 @@ fn points_outside_are_compared_with_the_nearest() {
 }
 
 #[test]
+fn points_too_far_outside_have_no_value() {
+    let b = scene(4, linear);
+    let mut a = scene(3, linear);
+    a.positions.iter_mut().for_each(|p| p[2] += 0.5);
+    let everywhere = Difference::of(&a.view(), b.view()).expect("a mesh");
+    let near = Difference::within(&a.view(), b.view(), 0.25).expect("a mesh");
+    for (i, p) in a.positions.iter().enumerate() {
+        let is_near = p[2] - 1.0 <= 0.25;
+        assert_eq!(near.values[i].is_nan(), !is_near, "{p:?}");
+        assert!(!is_near || near.values[i] == everywhere.values[i], "{p:?}");
+    }
+    assert!(near.values.iter().any(|value| value.is_nan()) && near.largest.is_finite());
+}
+
+#[test]
 fn bad_meshes_do_no_harm() {
     let a = scene(2, linear);
     assert_eq!(Difference::of(&a.view(), Scene::default().view()), None);

@@ -2,11 +2,12 @@
 //! from nothing makes.
 
 use crate::support::meshes::{built, cube, hilly, linear, parted};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::LazyLock;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Ray;
+use tetralod::mesh::NONE;
 use tetralod::mt::Mt;
 use tetralod::refine::Request;
 use tetralod::session::Session;
@@ -14,8 +15,8 @@ use tetralod::view::{Triangles, area, is_closed, region_color};
 use tetralod_build::{BuildConfig, build};
 use tetralod_render::draw::{BoxLines, CellStyle, Colouring, Edit, Style};
 use tetralod_render::scene::{
-    BoundaryState, CellState, ColourBy, ColourState, CompareState, IsosurfaceState, PlaneState, RegionName,
-    Scene, SceneError, SceneState, SliceState, ThresholdState, Update, VolumeState,
+    BoundaryState, CellState, ColourBy, ColourState, CompareState, IsosurfaceState, OtherMesh, PlaneState,
+    RegionName, Scene, SceneError, SceneState, SliceState, ThresholdState, Update, VolumeState,
 };
 
 /// A surface as it is drawn.
@@ -241,6 +242,61 @@ fn a_mesh_that_was_kept_is_listed_beside() {
     scene.set_state(state).expect("a good state");
     assert!(follow(&mut scene, &mut session, &mut drawn));
     assert!(drawn.beside.is_none());
+}
+
+#[test]
+fn the_difference_to_another_file_is_shown_where_both_are() {
+    let [_, state, ..] = states();
+    let (mut scene, mut session, mut drawn) = (scene(&state), opened(), Drawn::default());
+    session.refine(&Request::within(0.0)).expect("a good request");
+    // The lower half of the domain, where the other field is less by 2.
+    let half = cube(4, &[hilly]);
+    let positions: Vec<[f64; 3]> = half.positions.iter().map(|[x, y, z]| [x / 2.0, *y, *z]).collect();
+    let values = positions.iter().map(|p| linear(*p) - 2.0).collect();
+    let other = OtherMesh { positions, tets: half.tets.clone(), fields: vec![(1, values)], reach: 0.01 };
+    drawn.apply(&[scene.keep_other(&session, other.clone()).expect("a mesh")]);
+    let compare = Some(CompareState { at: 0.5, difference: true });
+    scene.set_state(SceneState { compare, ..state.clone() }).expect("a good state");
+    assert!(follow(&mut scene, &mut session, &mut drawn));
+    drawn.assert_same(&anew(&state, 0.0));
+    assert!(drawn.beside.is_none(), "nothing is drawn of the other mesh");
+    assert_eq!(scene.legend().expect("colours").label, "f0", "the other file has no such field");
+
+    session.set_field(1).expect("there is one");
+    scene.set_state(SceneState { compare, outline: false, ..state.clone() }).expect("a good state");
+    assert!(follow(&mut scene, &mut session, &mut drawn));
+    let legend = scene.legend().expect("colours").clone();
+    assert_eq!(legend.label, "difference of f1");
+    assert!((legend.scale.range[1] - 2.0).abs() < 1e-3, "{legend:?}");
+    let (points, outside) = {
+        let mesh = session.view();
+        let used: BTreeSet<u32> =
+            mesh.tets.as_flattened().iter().copied().filter(|point| *point != NONE).collect();
+        let outside = used.iter().filter(|point| mesh.positions[**point as usize][0] > 0.51).count();
+        (used.len(), outside)
+    };
+    assert!(outside > 0 && legend.apart == outside && outside < points, "{legend:?}: {outside} of {points}");
+    for surface in drawn.surfaces.values() {
+        let places = surface.triangles.as_flattened().iter().map(|v| surface.positions[*v as usize]);
+        assert!(places.into_iter().all(|[x, ..]| x <= 0.51));
+    }
+
+    scene.set_state(SceneState { outline: true, ..state.clone() }).expect("a good state");
+    assert!(follow(&mut scene, &mut session, &mut drawn));
+    assert_eq!(scene.legend().expect("colours").apart, 0);
+    let (mut again, mut whole) = (self::scene(&state), Drawn::default());
+    assert!(follow(&mut again, &mut session, &mut whole));
+    drawn.assert_same(&whole);
+    for bad in [
+        OtherMesh { tets: vec![[0, 1, 2, u32::MAX]], ..other.clone() },
+        OtherMesh { fields: vec![(1, vec![0.0])], ..other.clone() },
+        OtherMesh { fields: vec![(7, Vec::new())], ..OtherMesh::default() },
+        OtherMesh { reach: f64::NAN, ..other.clone() },
+        OtherMesh { tets: vec![[0, 1, 2, 3]; 3], ..other },
+    ] {
+        let refused = scene.keep_other(&session, bad).expect_err("no mesh");
+        assert!(matches!(refused, SceneError::State { ref what, .. } if what == "mesh"), "{refused}");
+    }
 }
 
 #[test]

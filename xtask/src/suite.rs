@@ -285,6 +285,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("pace.test.js"))?;
     shell::run(&mut node_test("fit.test.js"))?;
+    shell::run(&mut node_test("linked.test.js"))?;
     shell::run(&mut node_test("stored.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     shell::run(&mut node_test("writers.test.js"))?;

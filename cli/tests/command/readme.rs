@@ -14,13 +14,14 @@ const START: &str = "```console";
 pub const PROMPT: &str = "$ tetralod ";
 
 /// The pages with commands. Each is run in a folder of its own.
-const PAGES: [&str; 21] = [
+const PAGES: [&str; 22] = [
     "README.md",
     "docs/README.md",
     "docs/command.md",
     "docs/csp-and-cors.md",
     "docs/howto/big-models.md",
     "docs/howto/build-in-page.md",
+    "docs/howto/compare.md",
     "docs/howto/deformed.md",
     "docs/howto/element.md",
     "docs/howto/fields-and-time.md",

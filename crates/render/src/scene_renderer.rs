@@ -3,7 +3,7 @@
 use crate::draw::{Edit, Look};
 use crate::gpu::webgl::{GlContext, WebGl};
 use crate::gpu::{GpuError, Renderer, TextureView};
-use crate::scene::{Legend, Scene, SceneError, SceneState, Update};
+use crate::scene::{Legend, OtherMesh, Scene, SceneError, SceneState, Update};
 use tetralod::Coded;
 use tetralod::geom::{Bounds, Camera, Ray};
 use tetralod::session::{Deformation, Session};
@@ -161,6 +161,16 @@ impl<R: Draw + ?Sized> SceneRenderer<R> {
     /// If nothing has arrived yet.
     pub fn keep(&mut self, session: &mut Session) -> Result<(), ShowError> {
         let edit = self.scene.keep(session)?;
+        Ok(self.renderer.apply(&[edit])?)
+    }
+
+    /// As [`Scene::keep_other`].
+    ///
+    /// # Errors
+    /// If nothing has arrived yet, or if the mesh is none.
+    #[doc(hidden)]
+    pub fn keep_other(&mut self, session: &Session, other: OtherMesh) -> Result<(), ShowError> {
+        let edit = self.scene.keep_other(session, other)?;
         Ok(self.renderer.apply(&[edit])?)
     }
 

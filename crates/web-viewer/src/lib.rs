@@ -23,7 +23,7 @@ use tetralod::view::gizmo::{self, BoxFace};
 use tetralod_render::SceneRenderer;
 use tetralod_render::gpu::Renderer;
 use tetralod_render::gpu::webgl::WebGl;
-use tetralod_render::scene::{Legend, SceneState};
+use tetralod_render::scene::{Legend, OtherMesh, SceneState};
 use tetralod_web::arrays::{doubles, list, object, objects, set};
 use tetralod_web::file::File;
 use tetralod_web::loader::RangeLoader;
@@ -302,6 +302,24 @@ impl Viewer {
         Ok(self.scene.keep(&mut self.file.session)?)
     }
 
+    /// Keeps a mesh of another file, of which some fields of this one are given by their numbers: all values of one behind those of the other.
+    #[wasm_bindgen(js_name = keepOther)]
+    pub fn keep_other(
+        &mut self,
+        positions: &[f64],
+        tets: &[u32],
+        numbers: &[usize],
+        values: &[f64],
+        reach: f64,
+    ) -> Result<(), WebError> {
+        let positions = positions.as_chunks().0.to_vec();
+        let each = values.chunks(positions.len().max(1)).map(<[f64]>::to_vec);
+        let fields = numbers.iter().copied().zip(each).collect();
+        let other = OtherMesh { positions, tets: tets.as_chunks().0.to_vec(), fields, reach };
+        self.is_stale = true;
+        Ok(self.scene.keep_other(&self.file.session, other)?)
+    }
+
     /// Keeps the mesh as it is, whatever is asked for and wherever the camera goes; or lets it follow again.
     pub fn freeze(&mut self, is_frozen: bool) {
         self.is_frozen = is_frozen;
@@ -373,7 +391,7 @@ impl Viewer {
 
     /// What the colours mean; nothing where nothing is coloured by values.
     pub fn legend(&self) -> Option<JsLegend> {
-        let Legend { label, scale } = self.scene.legend()?;
+        let Legend { label, scale, apart } = self.scene.legend()?;
         let colours = scale.table::<COLOURS>();
         let colours =
             colours.iter().map(|[red, green, blue, _]| format!("#{red:02x}{green:02x}{blue:02x}").into());
@@ -391,6 +409,7 @@ impl Viewer {
             ("log", scale.is_log.into()),
             ("colours", objects(colours)),
             ("ticks", objects(ticks)),
+            ("apart", (*apart).into()),
         ]))
     }
 

@@ -5,7 +5,10 @@ use super::state::ColourState;
 use super::styles::{quantity, scale};
 use super::{SceneError, SceneState};
 use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::iter;
 use tetralod::geom::{Bounds, SingleValues};
+use tetralod::mesh::NONE;
 use tetralod::mt::{MeshChanges, MtInfo, Regions, numbers_of};
 use tetralod::session::{Session, TetQuantity};
 use tetralod::view::{ColourScale, Difference, MeshView};
@@ -18,6 +21,8 @@ pub(super) struct Current {
     tet_values: Vec<f64>,
     /// The field of the mesh without that of the one that was kept, if that is shown.
     difference: Option<Difference>,
+    /// Where some points have no difference: how many, the tetrahedra of the others, and their neighbours.
+    compared: Option<(usize, [Vec<[u32; 4]>; 2])>,
 }
 
 impl Current {
@@ -31,13 +36,36 @@ impl Current {
         Ok(is_new)
     }
 
-    /// Takes the field of `other` from that of the mesh.
-    pub fn compare(&mut self, mesh: &MeshView<'_>, other: Option<MeshView<'_>>) {
+    /// Takes the field of `other` from that of the mesh, at points that are not farther outside of it than so much. Tetrahedra with another
+    /// point are not shown.
+    pub fn compare(&mut self, mesh: &MeshView<'_>, other: Option<(MeshView<'_>, f64)>) {
         let had_one = self.difference.take().is_some();
-        self.difference = other.and_then(|other| Difference::of(mesh, other));
+        self.difference = other.and_then(|(other, reach)| Difference::within(mesh, other, reach));
         if had_one || self.difference.is_some() {
             // Each point has another value.
             self.changes.vertices = MeshChanges::of_all_vertices(mesh.positions.len()).vertices;
+        }
+        let had_some = self.compared.take().is_some();
+        self.compared = self.difference.as_ref().and_then(|found| {
+            let is_apart = |point: &u32| *point != NONE && found.values[*point as usize].is_nan();
+            // Points that no tetrahedron has do not count.
+            let apart: BTreeSet<u32> = mesh.tets.as_flattened().iter().copied().filter(is_apart).collect();
+            if apart.is_empty() {
+                return None;
+            }
+            let has = |tet: &[u32; 4]| tet[0] != NONE && !tet.iter().any(is_apart);
+            let neighbor = |n: u32| if n != NONE && has(&mesh.tets[n as usize]) { n } else { NONE };
+            let each = mesh.tets.iter().zip(mesh.neighbors);
+            let both = each.map(
+                |(tet, beside)| {
+                    if has(tet) { (*tet, beside.map(neighbor)) } else { ([NONE; 4], [NONE; 4]) }
+                },
+            );
+            let (tets, neighbors) = both.unzip();
+            Some((apart.len(), [tets, neighbors]))
+        });
+        if had_some || self.compared.is_some() {
+            self.changes.tets = iter::once(0..mesh.tets.len() as u32).collect();
         }
     }
 
@@ -51,10 +79,15 @@ impl Current {
         let mesh = session.last_view();
         let difference = self.difference.as_ref();
         let coloured = difference.map_or(mesh.field, |difference| &difference.values);
+        let [tets, neighbors] = match &self.compared {
+            Some((_, [tets, neighbors])) => [&tets[..], &neighbors[..]],
+            None => [mesh.tets, mesh.neighbors],
+        };
         Input {
-            mesh: MeshView { field: coloured, ..mesh },
+            mesh: MeshView { field: coloured, tets, neighbors, ..mesh },
             field: mesh.field,
             largest_difference: difference.map(|difference| difference.largest),
+            apart: self.compared.as_ref().map_or(0, |(apart, _)| *apart),
             fields: Box::new(move |field| session.values(field).into()),
             tet_values: &self.tet_values,
             regions: session.shown_regions(),
@@ -117,6 +150,8 @@ pub(super) struct Input<'a> {
     pub field: &'a [f64],
     /// The largest absolute value of the difference, if that is shown.
     pub largest_difference: Option<f64>,
+    /// Points without a difference, where that is shown.
+    pub apart: usize,
     /// The values of a field, by its number.
     pub fields: Box<dyn Fn(usize) -> Cow<'a, [f64]> + 'a>,
     /// A number for each tetrahedron, if they are coloured by one.

@@ -9,4 +9,6 @@ pub struct Legend {
     pub label: String,
     /// The colours of its values.
     pub scale: ColourScale,
+    /// Points of the mesh that have no value: of the difference to a mesh of another file, those outside of that one.
+    pub apart: usize,
 }

@@ -15,6 +15,8 @@ mod state;
 mod styles;
 
 pub use error::SceneError;
+#[doc(hidden)]
+pub use kept::OtherMesh;
 pub use legend::Legend;
 #[doc(hidden)]
 pub use state::RegionName;
@@ -34,7 +36,7 @@ use styles::clips;
 use styles::{quantity, scale};
 use tetralod::geom::{Bounds, Camera, Ray};
 use tetralod::mt::numbers_of;
-use tetralod::session::{Deformation, Session, Within};
+use tetralod::session::{Deformation, Session, SessionError, Within};
 use tetralod::view::{MeshView, Place, Probe};
 
 /// The outline of the domain, on a dark and on a light background.
@@ -112,6 +114,18 @@ impl Scene {
     /// If nothing has arrived yet.
     pub fn keep(&mut self, session: &mut Session) -> Result<Edit<'static>, SceneError> {
         self.kept = Some(Kept { mesh: KeptMesh::of(session)?, objects: Objects::default() });
+        self.is_stale = true;
+        Ok(Edit::Beside { split: 0.0, edits: Vec::new() })
+    }
+
+    /// Keeps a mesh of another file in place of one that was kept: nothing but the difference to it can be shown, of fields that it has.
+    ///
+    /// # Errors
+    /// If nothing has arrived yet, or if the mesh is none.
+    #[doc(hidden)]
+    pub fn keep_other(&mut self, session: &Session, other: OtherMesh) -> Result<Edit<'static>, SceneError> {
+        let info = session.info().ok_or(SessionError::NotReady)?;
+        self.kept = Some(Kept { mesh: KeptMesh::of_other(info, other)?, objects: Objects::default() });
         self.is_stale = true;
         Ok(Edit::Beside { split: 0.0, edits: Vec::new() })
     }
@@ -239,12 +253,12 @@ impl Scene {
         let (Some(info), field) = (session.info(), session.field()) else { return Ok(is_stale) };
         let compare = state.compare.unwrap_or(CompareState { at: 0.0, difference: false });
         let other = kept.as_ref().filter(|_| compare.difference);
-        current.compare(&session.last_view(), other.map(|kept| kept.mesh.view(field)));
+        current.compare(&session.last_view(), other.and_then(|kept| kept.mesh.compared(field)));
         let opacities = input::region_opacities(state, session.regions())?;
         let looks = || (state, opacities.clone());
         objects.list(&current.input(session, info, looks(), bounds), is_stale, edits)?;
         if is_stale {
-            let kept = kept.as_mut().filter(|_| compare.at > 0.0);
+            let kept = kept.as_mut().filter(|kept| compare.at > 0.0 && kept.mesh.is_own());
             let split = if kept.is_some() { compare.at } else { 0.0 };
             let mut left = Vec::new();
             let listed = kept.map_or(Ok(()), |kept| {

@@ -168,7 +168,7 @@ fn list_cells<'a>(input: &Input<'a>, legend: &mut Option<Legend>, edits: &mut Ed
     };
     // Colours of regions mean no values.
     let named = quantity.filter(|quantity| *quantity != TetQuantity::Region);
-    *legend = named.map(|quantity| Legend { label: quantity.name().to_owned(), scale });
+    *legend = named.map(|quantity| Legend { label: quantity.name().to_owned(), scale, apart: 0 });
     edits.push(Edit::Cells(Some(cell_style(cells, scale, quantity.is_some()))));
     Ok(())
 }
@@ -495,7 +495,7 @@ fn solids<'a>(
     };
     let label = field.map_or(own, |field| &input.info.fields[field].name).to_owned();
     // Where nothing else is coloured by values, the legend is theirs.
-    legend.get_or_insert(Legend { label, scale });
+    legend.get_or_insert(Legend { label, scale, apart: 0 });
     let style = Style { colouring: Colouring::Scale(scale), ..Style::default() };
     Ok(Edit::Surface { key, triangles, changes: None, style })
 }
@@ -523,7 +523,8 @@ fn update_legend(shown: &mut Option<Legend>, input: &Input<'_>) -> Result<()> {
         let name = &input.info.fields[field].name;
         let is_difference = field == input.shown && input.largest_difference.is_some();
         let label = if is_difference { format!("difference of {name}") } else { name.clone() };
-        input.scale(field).map(|scale| Legend { label, scale })
+        let apart = if is_difference { input.apart } else { 0 };
+        input.scale(field).map(|scale| Legend { label, scale, apart })
     };
     *shown = field.map(legend).transpose()?;
     Ok(())
