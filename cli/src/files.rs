@@ -145,6 +145,8 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
     let mut out = BufWriter::new(file);
     let written = write(&mut out).and_then(|done| {
         out.flush()?;
+        // A full disk of another machine is told here at the latest; and a file that is in its place is whole after a power cut, too.
+        out.get_ref().sync_all()?;
         Ok(done)
     });
     drop(out);
