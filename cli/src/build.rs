@@ -12,7 +12,7 @@ use super::output::Verbosity;
 use super::progress::with_progress;
 use super::remedies::failed;
 use super::restrictions::Angles;
-use super::{extremes, files, input, parse, parts};
+use super::{extremes, files, input, machine, parse, parts};
 use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -58,10 +58,7 @@ impl Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let Arguments { options, verbosity, .. } = arguments;
-    if let Some(threads) = arguments.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-        pool.build_global().context("starting the threads")?;
-    }
+    machine::set_threads(arguments.threads)?;
     if let Some([index, all]) = arguments.part {
         return parts::build_part(&options.inputs, [index, all], verbosity);
     }

@@ -36,16 +36,18 @@ fn partial() -> MutexGuard<'static, Vec<PathBuf>> {
 
 /// Makes Ctrl-C (and SIGTERM) end the program without leaving a partial file.
 pub fn remove_partial_output_on_interrupt() -> Result<()> {
-    let interrupted = || {
-        // Reassembly to the end: no file can be created or put in place any more.
-        let partial = partial();
-        for path in &*partial {
-            let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-        }
-        eprintln!("\ninterrupted");
-        std::process::exit(INTERRUPTED);
-    };
-    ctrlc::set_handler(interrupted).context("the handler for Ctrl-C could not be set")
+    ctrlc::set_handler(|| interrupt()).context("the handler for Ctrl-C could not be set")
+}
+
+/// Ends the program without leaving a partial file.
+pub fn interrupt() -> ! {
+    // Reassembly to the end: no file can be created or put in place any more.
+    let partial = partial();
+    for path in &*partial {
+        let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    }
+    eprintln!("\ninterrupted");
+    std::process::exit(INTERRUPTED);
 }
 
 /// The inputs that were given or read, at their places without links.
@@ -145,6 +147,8 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
     let mut out = BufWriter::new(file);
     let written = write(&mut out).and_then(|done| {
         out.flush()?;
+        // A full disk of another machine is told here at the latest; and a file that is in its place is whole after a power cut, too.
+        out.get_ref().sync_all()?;
         Ok(done)
     });
     drop(out);
@@ -220,6 +224,40 @@ fn move_all(from: &Path, to: &Path, last: &Path) -> std::io::Result<()> {
         }
     }
     fs::rename(from.join(last), to.join(last))
+}
+
+/// A file that is there as long as this value, and no longer than the program unless that is killed.
+pub struct Transient {
+    file: File,
+    path: PathBuf,
+}
+
+impl Transient {
+    /// Makes a file with this content. Of all processes that try it at a time one gets it: the others fail, as there is one already.
+    pub fn create(path: PathBuf, content: &[u8]) -> std::io::Result<Self> {
+        let mut partial = partial();
+        let file = File::create_new(&path)?;
+        partial.push(path.clone());
+        drop(partial);
+        let mut created = Self { file, path };
+        created.append(content)?;
+        Ok(created)
+    }
+
+    /// Writes more to its end, where others see it: to this file, even if there is another one of its name by now.
+    pub fn append(&mut self, content: &[u8]) -> std::io::Result<()> {
+        self.file.write_all(content)?;
+        self.file.sync_all()
+    }
+}
+
+impl Drop for Transient {
+    fn drop(&mut self) {
+        let mut partial = partial();
+        partial.retain(|path| *path != self.path);
+        // It may be gone already.
+        let _ = fs::remove_file(&self.path);
+    }
 }
 
 /// Writes a file of a folder that is not kept. After an interruption, which removes the folder, none appears any more.

@@ -5,7 +5,7 @@ use super::{build, extremes, files, parts};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tetralod::mt::{AveragedField, MultiTessellation};
 use tetralod_build::parts::Node;
 use tetralod_build::{BuildResult, BuildSummary};
@@ -48,9 +48,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let output = output.as_ref().context("-o FILE is missing")?;
     files::check_ending(output, "mt")?;
-    // All that is in the folder is read.
-    let parts: Vec<PathBuf> =
-        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+    finish(folder, output, verbosity)
+}
+
+/// Writes the MT file of all that has been built.
+pub fn finish(folder: &Path, output: &Path, verbosity: &Verbosity) -> Result<()> {
+    // All parts in the folder are read.
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let parts: Vec<PathBuf> = entries.filter(|path| files::ending(path) == "part").collect();
     files::check_output(output, &parts)?;
     let (BuildResult { mt, summary, exact, .. }, plan) = parts::assemble(folder, verbosity)?;
     let file_bytes = files::write_mt(output, &mt, exact, plan.metadata().clone())?;

@@ -36,12 +36,14 @@ mod restrictions;
 mod serve;
 mod slice;
 mod stats;
+mod status;
 mod steps;
 mod streamlines;
 mod surface;
 mod usage;
 mod verify;
 mod view;
+mod work;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
@@ -62,6 +64,8 @@ enum Command {
     Build(Box<build::Arguments>),
     Part(Box<part::Arguments>),
     Join(join::Arguments),
+    Work(work::Arguments),
+    Status(status::Arguments),
     Convert(convert::Arguments),
     Info(info::Arguments),
     Extract(Box<extract::Arguments>),
@@ -90,7 +94,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, again: &[OsString]) ->
     match run_command(Arguments::parse_from(arguments).command, again) {
         Ok(code) => code,
         Err(error) => {
-            output::note(&format!("error: {error:#}"));
+            output::note_error(&error);
             output::FAILED
         }
     }
@@ -106,6 +110,8 @@ fn run_command(command: Command, again: &[OsString]) -> anyhow::Result<u8> {
         Command::Build(arguments) => build::run(&arguments)?,
         Command::Part(arguments) => part::run(&arguments)?,
         Command::Join(arguments) => join::run(&arguments)?,
+        Command::Work(arguments) => work::run(&arguments, again)?,
+        Command::Status(arguments) => status::run(&arguments)?,
         Command::Convert(arguments) => convert::run(&arguments)?,
         Command::Info(arguments) => info::run(&arguments)?,
         Command::Verify(arguments) => return verify::run(&arguments),

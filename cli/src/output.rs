@@ -6,6 +6,7 @@ use serde::Serialize;
 use std::borrow::Cow;
 use std::io;
 use std::io::Write;
+use std::process::ExitStatus;
 
 /// The exit code where something failed.
 pub const FAILED: u8 = 1;
@@ -18,7 +19,7 @@ pub struct Verbosity {
     pub quiet: bool,
     /// Print the summary as a JSON object, also with --quiet.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     /// How stderr shows the progress: as a bar, on a terminal alone, or as json, for programs: now and then a line
     /// {"stage": "remove", "done": 1200, "total": 4800}, in which total may grow [default: bar].
     #[arg(long, value_name = "HOW", value_parser = |text: &str| named(text, &[("bar", Progress::Bar), ("json", Progress::Json)]))]
@@ -41,7 +42,7 @@ impl Verbosity {
 
 /// Prints a result: `report` as one JSON object, or `rows` for people.
 pub fn result<N: AsRef<str>>(as_json: bool, report: &impl Serialize, rows: &[(N, String)]) -> Result<()> {
-    if as_json { json(report) } else { table(rows) }
+    if as_json { json(report) } else { print(&lines(rows)) }
 }
 
 /// Prints `value` as one JSON object.
@@ -50,12 +51,11 @@ pub fn json(value: &impl Serialize) -> Result<()> {
     print(&text)
 }
 
-/// Prints lines of `name  value`, the values below one another.
-fn table<N: AsRef<str>>(rows: &[(N, String)]) -> Result<()> {
+/// Lines of `name  value`, the values below one another.
+pub fn lines<N: AsRef<str>>(rows: &[(N, String)]) -> String {
     let width = rows.iter().map(|(name, _)| name.as_ref().len()).max().unwrap_or(0);
     let line = |(name, value): &(N, String)| format!("{:<width$}  {value}", name.as_ref());
-    let lines: Vec<String> = rows.iter().map(line).collect();
-    print(&lines.join("\n"))
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// Prints a text and a line end.
@@ -67,6 +67,30 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
+/// How the lines of an error begin, on stderr.
+const ERROR: &str = "error: ";
+
+/// Tells people why the command failed, on stderr.
+pub fn note_error(error: &anyhow::Error) {
+    note(&format!("{ERROR}{error:#}"));
+}
+
+/// Whether a line of stderr begins an error.
+pub fn is_error(line: &str) -> bool {
+    line.starts_with(ERROR)
+}
+
+/// Why a process of this command failed, by all that it has said on stderr.
+pub fn failure(said: &str, status: ExitStatus) -> String {
+    // Notes come before the error, whose words may go on.
+    let lines: Vec<&str> = said.lines().skip_while(|line| !is_error(line)).collect();
+    match lines.join("\n").strip_prefix(ERROR) {
+        Some(error) => error.to_owned(),
+        // The system ends what takes too much memory.
+        None => format!("the process ended with {status}, perhaps for want of memory"),
+    }
+}
+
 /// Tells people something beside the result, on stderr.
 pub fn note(text: &str) {
     eprintln!("{}", printable(text));
@@ -74,7 +98,7 @@ pub fn note(text: &str) {
 
 /// A text in which characters that do something to a terminal, or to the order in which others are shown, are written as in JSON: names
 /// come from files of others.
-fn printable(text: &str) -> Cow<'_, str> {
+pub fn printable(text: &str) -> Cow<'_, str> {
     let acts = |c: char| {
         c.is_control() && c != '\n' || matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
     };

@@ -5,10 +5,11 @@ use super::build::way::Way;
 use super::files;
 use super::output::{self, Verbosity};
 use super::parts::{Folder, PLAN, PlanFile};
+use super::work::tasks;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use tetralod_build::parts::PartsError;
+use tetralod_build::parts::{PartsError, Plan};
 
 /// Parts a mesh in space, so that each part is built on its own (`tetralod build --part`) and all are joined to one MT file (`tetralod
 /// join`): for meshes that one machine cannot hold, and for clusters.
@@ -39,11 +40,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut config = options.config();
     config.keep_points = options.restrictions.points()?;
     let metadata = options.metadata(&config);
+    let fill = |part: &dyn Fn(&Path) -> Result<Plan>| {
+        files::fill_folder(output, Path::new(PLAN), |folder| {
+            let plan = part(folder)?;
+            tasks::forget(output)?;
+            Ok(plan)
+        })
+    };
     let by_pieces = options.in_pieces(&config, None, |input| {
         let part = |folder: &Path| {
             Folder(folder).part_pieces(&input, &config, *parts, metadata.clone())?.map_err(Into::into)
         };
-        match files::fill_folder(output, Path::new(PLAN), part) {
+        match fill(&part) {
             Ok(plan) => Ok(Some(plan)),
             Err(error) => match error.downcast::<PartsError>()? {
                 why @ PartsError::NeedsWhole { .. } => {
@@ -59,8 +67,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         let (mesh, repaired) = options.read(&config, options.repair.level(), None, true)?;
         options.repair_of(&mesh, &repaired, Way::Parts(*parts), verbosity)?;
-        let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata);
-        files::fill_folder(output, Path::new(PLAN), part).with_context(|| options.name())?
+        let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata.clone());
+        fill(&part).with_context(|| options.name())?
     };
     let report = Report { folder: output.display().to_string(), plan: PlanFile::of(&plan) };
     let levels: Vec<String> = report.plan.levels.iter().map(u32::to_string).collect();

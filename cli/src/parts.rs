@@ -5,7 +5,7 @@ use super::output::{self, Verbosity};
 use super::progress::{progress_bar, with_progress};
 use super::remedies::failed;
 use anyhow::{Context, Result, bail};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
@@ -38,12 +38,17 @@ fn numbers(text: &str) -> Option<[u32; 2]> {
 /// The file that says which steps there are.
 pub const PLAN: &str = "plan.json";
 
+/// The version of this program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// The folder in which steps hand each other files.
 pub struct Folder<'a>(pub &'a Path);
 
 /// What [`PLAN`] says, for programs that plan the steps.
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 pub struct PlanFile {
+    /// That of the program that has parted the mesh: another one may build other bytes.
+    version: String,
     pub parts: u32,
     /// How many files each level has: `built-L-K.part`. Eight of one level make one of the next.
     pub levels: Vec<u32>,
@@ -54,7 +59,8 @@ pub struct PlanFile {
 impl PlanFile {
     pub fn of(plan: &Plan) -> Self {
         let [vertices, tetrahedra] = plan.counts();
-        Self { parts: plan.parts(), levels: plan.levels(), tetrahedra, vertices }
+        let version = VERSION.to_owned();
+        Self { version, parts: plan.parts(), levels: plan.levels(), tetrahedra, vertices }
     }
 }
 
@@ -63,7 +69,7 @@ impl Folder<'_> {
         self.0.join(format!("input-{index}.part"))
     }
 
-    fn built(&self, node: Node) -> PathBuf {
+    pub fn built(&self, node: Node) -> PathBuf {
         self.0.join(format!("built-{}-{}.part", node.level, node.index))
     }
 
@@ -111,6 +117,27 @@ impl Folder<'_> {
                 },
             }
         })
+    }
+
+    /// The plan, as its first part has it, if this version has made it.
+    pub fn checked_plan(&self) -> Result<Plan> {
+        let (folder, path) = (self.0.display(), self.0.join(PLAN));
+        let text = match std::fs::read(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                bail!("{folder} has no {PLAN}: `tetralod part INPUT --parts N -o {folder}` writes it")
+            }
+            text => text.with_context(|| path.display().to_string())?,
+        };
+        let file: PlanFile = serde_json::from_slice(&text)
+            .with_context(|| format!("{} is no plan of this version; part the mesh again", path.display()))?;
+        if file.version != VERSION {
+            let version = file.version;
+            bail!(
+                "{folder} was written by tetralod {version}, and this is {VERSION}, which may build other bytes: take tetralod {version}, or part \
+                 the mesh again by this one"
+            );
+        }
+        read(&self.parted(0), "`tetralod part`", |file| Plan::read(file))
     }
 
     fn keep_parted(&self, part: &Part) -> Result<(), PartsError> {
@@ -249,7 +276,7 @@ fn missing(path: &Path, made_by: &str) -> String {
 }
 
 /// The command that writes the file of a node.
-fn command_for(node: Node, plan: &Plan) -> String {
+pub fn command_for(node: Node, plan: &Plan) -> String {
     match node {
         Node { level: 0, index } => format!("`tetralod build --part {index}/{}`", plan.parts()),
         Node { level, index } => format!("`tetralod join --node {level}/{index}`"),

@@ -1,5 +1,5 @@
-//! Promise: the workflows of `workflows/`, by Snakemake and by the plain shell, build the file that `tetralod build --parts` builds, byte for
-//! byte, also where a process is killed in the middle and the same command is given again; then nothing that is finished is done twice.
+//! Promise: the workflows of `workflows/` build the file that `tetralod build --parts` builds, byte for byte; that of Snakemake also where a process
+//! is killed in the middle and the same command is given again: then nothing that is finished is done twice.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,12 +41,12 @@ pub fn test() -> Result<()> {
     let undisturbed = run.output("undisturbed");
     let mut one_process = shell::command(&program, ["build", "--quiet", "--parts", &PARTS.to_string()]);
     shell::run(one_process.args(OPTIONS).arg(&run.input).arg("-o").arg(&undisturbed))?;
-    run.kill_and_go_on("shell", |output, calls| run.shell(output, calls))?;
     run.kill_and_go_on("snakemake", |output, calls| run.snakemake(&snakemake, output, calls))?;
+    let by_workers = run.slurm()?;
     let expected = fs::read(&undisturbed)?;
-    for name in ["shell", "snakemake"] {
-        let built = fs::read(run.output(name))?;
-        ensure!(built == expected, "{name}: the file differs from the one that one process has built");
+    for path in [run.output("snakemake"), by_workers] {
+        let name = path.display();
+        ensure!(fs::read(&path)? == expected, "{name} differs from the file that one process has built");
     }
     shell::run(shell::command(&program, ["verify"]).arg(&undisturbed).arg("--against").arg(&run.input))
 }
@@ -77,11 +77,21 @@ impl Run {
         self.folder.join(format!("{name}.mt"))
     }
 
-    fn shell(&self, output: &Path, calls: &str) -> Command {
-        let mut command = shell::command("sh", [format!("{SOURCES}/build-in-parts.sh")]);
-        command.args(["--jobs", "4", "--parts", &PARTS.to_string(), "--command"]).arg(&self.wrapper);
-        command.arg("-o").arg(output).arg(&self.input).arg("--").args(OPTIONS);
-        self.counted(command, calls)
+    /// Runs two jobs of the array for Slurm as processes at a time; returns the file that they have built.
+    fn slurm(&self) -> Result<PathBuf> {
+        let folder = self.folder.join("slurm.parts");
+        let mut part = shell::command(&self.program, ["part", "--quiet", "--parts", &PARTS.to_string()]);
+        shell::run(part.args(OPTIONS).arg(&self.input).arg("-o").arg(&folder))?;
+        let job = || {
+            shell::command("sh", [format!("{SOURCES}/slurm.sh")])
+                .arg(&folder)
+                .env("TETRALOD", &self.program)
+                .spawn()
+        };
+        for mut job in [job()?, job()?] {
+            ensure!(job.wait()?.success(), "slurm.sh failed");
+        }
+        Ok(folder.join("built.mt"))
     }
 
     fn snakemake(&self, snakemake: &Path, output: &Path, calls: &str) -> Command {

@@ -21,9 +21,6 @@ const LOOK: Duration = Duration::from_millis(500);
 /// How often the page asks for the list, in ms.
 const ASK: u64 = 1000;
 
-/// How the command begins what it says of an error.
-const ERROR: &str = "error: ";
-
 /// How an MT file begins.
 const MT: [u8; 8] = *b"\x89TLOD\r\n\x1a";
 
@@ -291,8 +288,8 @@ impl Volumes {
                 continue;
             }
             // Words about an error may go on.
-            if line.starts_with(ERROR) || !said.is_empty() {
-                said = format!("{said}\n{line}");
+            if output::is_error(&line) || !said.is_empty() {
+                said += &format!("{line}\n");
             } else {
                 bar.suspend(|| output::note(&line));
             }
@@ -301,13 +298,7 @@ impl Volumes {
         let Some(mut child) = self.building().child.take() else { bail!("stopped") };
         let status = child.wait()?;
         if !status.success() {
-            match said.trim_start().strip_prefix(ERROR) {
-                Some(problem) => bail!("{problem}"),
-                // The system ends what takes too much memory.
-                None => {
-                    bail!("{}: the build ended with {status}, perhaps for want of memory", given.display())
-                }
-            }
+            bail!(output::failure(&said, status));
         }
         let Report { inputs } =
             serde_json::from_slice(&fs::read(&report)?).context("the report of the build")?;

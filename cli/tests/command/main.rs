@@ -19,3 +19,4 @@ mod serve;
 mod support;
 mod surfaces;
 mod view;
+mod work;

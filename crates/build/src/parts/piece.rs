@@ -8,7 +8,7 @@ use super::PartsError;
 use super::plan::{Node, Plan};
 use super::wire::{read_frame, read_magic, skip_frame, write_frame, write_magic};
 use serde::{Deserialize, Serialize};
-use std::io::{Read, Seek, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use tetralod::geom::orient3d;
 use tetralod::mesh::NONE;
 
@@ -253,6 +253,26 @@ impl Part {
         Ok(part)
     }
 
+    /// Reads what a part that has been built is of, and checks that it is as long as it says; the rest of it is not read.
+    ///
+    /// # Errors
+    /// If `input` fails, or holds no part that has been built, or not the whole of one.
+    pub fn survey<R: Read + Seek>(input: &mut R) -> Result<(Plan, Node), PartsError> {
+        read_magic(input)?;
+        let Head { plan, node, built } = read_frame(input)?;
+        if !built {
+            return Err(PartsError::Damaged { what: "it has not been built" });
+        }
+        skip_frame(input)?;
+        skip_frame(input)?;
+        let end = input.stream_position()?;
+        if input.seek(SeekFrom::End(0))? == end {
+            Ok((plan, node))
+        } else {
+            Err(PartsError::Damaged { what: "its length is another one" })
+        }
+    }
+
     /// Checks what building relies on.
     fn check(&self) -> Result<(), &'static str> {
         let Self { head: Head { plan, node, .. }, piece } = self;
@@ -386,6 +406,21 @@ mod tests {
         let (built, updates) =
             build_part(first.clone(), &mut |_| ControlFlow::Continue(())).expect("a part to build");
         (first, built, updates)
+    }
+
+    #[test]
+    fn a_part_is_surveyed_by_its_head_and_its_length() {
+        let (first, built, updates) = parts();
+        let (mut bytes, mut unbuilt) = (Vec::new(), Vec::new());
+        built.write_built(&updates, &mut bytes).expect("bytes");
+        first.write(&mut unbuilt).expect("bytes");
+        let survey = |bytes: &[u8]| Part::survey(&mut Cursor::new(bytes));
+        assert_eq!(survey(&bytes).expect("a whole part"), (built.head.plan, built.head.node));
+        let longer = [&bytes[..], b"x"].concat();
+        for other in [&bytes[..bytes.len() - 1], &bytes[..bytes.len() / 2], &longer, &unbuilt] {
+            assert!(matches!(survey(other), Err(PartsError::Damaged { .. })), "{} bytes", other.len());
+        }
+        assert!(matches!(survey(b"something else"), Err(PartsError::Format)));
     }
 
     #[test]

@@ -1,0 +1,264 @@
+//! The tasks of a folder of parts: a step for each node, the last of which writes the MT file; which are done, and what workers have written
+//! down of them.
+
+use crate::files;
+use crate::parts::{Folder, command_for};
+use anyhow::{Context, Result, ensure};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
+use tetralod_build::parts::{Node, Part, Plan};
+
+/// The folder, in that of the parts, in which workers write down what they do.
+const NOTES: &str = "work";
+
+/// The MT file, in the folder of the parts.
+const FILE: &str = "built.mt";
+
+/// What is to be done in a folder. A task has the level and the number of the node that it makes; that which writes the file is above all.
+pub struct Tasks {
+    folder: PathBuf,
+    plan: Plan,
+    /// How many tasks each level has.
+    counts: Vec<u32>,
+}
+
+/// A task that is done.
+#[derive(Serialize, Deserialize)]
+pub struct Done {
+    pub seconds: f64,
+    /// The most memory that its process had, in bytes.
+    pub peak_memory: Option<u64>,
+    pub host: String,
+}
+
+/// A try of a task that failed.
+#[derive(Serialize, Deserialize)]
+pub struct Failed {
+    pub error: String,
+    /// How many tries the worker allowed that noted it.
+    pub tries: u32,
+    #[serde(flatten)]
+    pub done: Done,
+}
+
+/// The files that are there at a time.
+pub struct Files {
+    parts: BTreeSet<OsString>,
+    notes: BTreeSet<OsString>,
+}
+
+/// Tasks that are not done.
+#[derive(Default)]
+pub struct Open {
+    /// All that they need is done.
+    pub ready: BTreeSet<Node>,
+    /// All that they need is done, or can be done.
+    later: BTreeSet<Node>,
+    pub failed: Vec<Node>,
+}
+
+impl Open {
+    fn has(&self, task: Node) -> bool {
+        self.ready.contains(&task) || self.later.contains(&task)
+    }
+}
+
+impl Tasks {
+    /// # Errors
+    /// If there is no plan, or one of another version.
+    pub fn of(folder: &Path) -> Result<Self> {
+        let plan = Folder(folder).checked_plan()?;
+        let mut counts = plan.levels();
+        counts.push(1);
+        Ok(Self { folder: folder.to_owned(), plan, counts })
+    }
+
+    /// All tasks, those first that others have to be done for.
+    pub fn all(&self) -> impl Iterator<Item = Node> {
+        let of_level = |(level, &count)| (0..count).map(move |index| Node { level, index });
+        (0..).zip(&self.counts).flat_map(of_level)
+    }
+
+    pub fn levels(&self) -> &[u32] {
+        &self.counts
+    }
+
+    /// The tasks that have to be done before.
+    pub fn needed(&self, task: Node) -> Vec<Node> {
+        if task == self.last() {
+            self.all().filter(|other| *other != task).collect()
+        } else {
+            // Parts need none.
+            self.plan.children(task).unwrap_or_default()
+        }
+    }
+
+    /// What of the tasks that are not done can be done, where some have failed too often.
+    pub fn open(&self, done: &BTreeSet<Node>, has_failed: impl Fn(Node) -> bool) -> Open {
+        let mut open = Open::default();
+        for task in self.all().filter(|task| !done.contains(task)) {
+            let needed = self.needed(task);
+            if has_failed(task) {
+                open.failed.push(task);
+            } else if needed.iter().all(|other| done.contains(other)) {
+                open.ready.insert(task);
+            } else if needed.iter().all(|other| done.contains(other) || open.has(*other)) {
+                open.later.insert(task);
+            }
+        }
+        open
+    }
+
+    /// The one that writes the file.
+    pub fn last(&self) -> Node {
+        Node { level: self.counts.len() as u32 - 1, index: 0 }
+    }
+
+    /// What it does, for people.
+    pub fn name(&self, task: Node) -> String {
+        let Node { level, index } = task;
+        match level {
+            0 => format!("build {index}/{}", self.counts[0]),
+            _ if task == self.last() => "write the file".to_owned(),
+            _ => format!("join {level}/{index}"),
+        }
+    }
+
+    /// The file that it writes.
+    pub fn result(&self, task: Node) -> PathBuf {
+        if task == self.last() { self.folder.join(FILE) } else { Folder(&self.folder).built(task) }
+    }
+
+    /// The file of a note about it.
+    pub fn note(&self, task: Node, what: &str) -> PathBuf {
+        self.folder.join(NOTES).join(format!("{}-{}.{what}", task.level, task.index))
+    }
+
+    /// Makes the place for notes.
+    pub fn make_place(&self) -> Result<()> {
+        let place = self.folder.join(NOTES);
+        fs::create_dir_all(&place).with_context(|| format!("{} could not be made", place.display()))
+    }
+
+    pub fn files(&self) -> Result<Files> {
+        let names = |folder: &Path| -> Result<BTreeSet<OsString>> {
+            let all = || -> std::io::Result<_> {
+                fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name())).collect()
+            };
+            match all() {
+                // Nobody has begun.
+                Err(error) if error.kind() == ErrorKind::NotFound => Ok(BTreeSet::new()),
+                names => names.with_context(|| folder.display().to_string()),
+            }
+        };
+        Ok(Files { parts: names(&self.folder)?, notes: names(&self.folder.join(NOTES))? })
+    }
+
+    /// Whether a task is done: its result is there, as it is put in place whole.
+    ///
+    /// # Errors
+    /// If that is damaged, or of another plan.
+    pub fn is_done(&self, task: Node) -> Result<bool> {
+        let path = self.result(task);
+        if task == self.last() {
+            return Ok(path.exists());
+        }
+        let file = match File::open(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+            file => file.with_context(|| path.display().to_string())?,
+        };
+        let again =
+            || format!("{}: remove it, and {} makes it again", path.display(), command_for(task, &self.plan));
+        let (plan, node) = Part::survey(&mut BufReader::new(file)).with_context(again)?;
+        ensure!(
+            plan == self.plan && node == task,
+            "{} is of another plan: remove it, or part the mesh into another folder",
+            path.display()
+        );
+        Ok(true)
+    }
+
+    /// How often a task has failed.
+    pub fn tries(&self, task: Node, files: &Files) -> u32 {
+        let is_noted = |number: &u32| files.has_note(&self.failed(task, *number));
+        (1..).take_while(is_noted).last().unwrap_or(0)
+    }
+
+    fn failed(&self, task: Node, number: u32) -> PathBuf {
+        self.note(task, &format!("failed-{number}"))
+    }
+
+    /// What was noted of a try.
+    pub fn failure(&self, task: Node, number: u32) -> Option<Failed> {
+        read(&self.failed(task, number))
+    }
+
+    /// What was noted when it was done.
+    pub fn done(&self, task: Node) -> Option<Done> {
+        read(&self.note(task, "done"))
+    }
+
+    pub fn note_done(&self, task: Node, done: &Done) -> Result<()> {
+        files::write_file(&self.note(task, "done"), |out| Ok(serde_json::to_writer(out, done)?))
+    }
+
+    /// Notes a try that failed, beside those that others note at the same time.
+    pub fn note_failure(&self, task: Node, failed: &Failed) -> Result<()> {
+        for number in 1.. {
+            let path = self.failed(task, number);
+            match File::create_new(&path) {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => (),
+                file => {
+                    let write = || -> Result<()> { Ok(serde_json::to_writer(file?, failed)?) };
+                    return write().with_context(|| format!("{} could not be written", path.display()));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes what was noted of tries that failed.
+    pub fn forget_failures(&self) -> Result<()> {
+        let files = self.files()?;
+        for task in self.all() {
+            for number in (1..=self.tries(task, &files)).rev() {
+                fs::remove_file(self.failed(task, number))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Files {
+    /// Whether the result of a task is there.
+    pub fn has_result(&self, result: &Path) -> bool {
+        self.parts.contains(result.file_name().unwrap_or_default())
+    }
+
+    pub fn has_note(&self, note: &Path) -> bool {
+        self.notes.contains(note.file_name().unwrap_or_default())
+    }
+}
+
+/// Removes what workers have made of the plan before: the file, and their notes. Parts that are built are kept: they tell their plan.
+pub fn forget(folder: &Path) -> Result<()> {
+    let gone = |done: std::io::Result<()>, path: &Path| match done {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(error).with_context(|| path.display().to_string())
+        }
+        _ => Ok(()),
+    };
+    let (file, notes) = (folder.join(FILE), folder.join(NOTES));
+    gone(fs::remove_file(&file), &file)?;
+    gone(fs::remove_dir_all(&notes), &notes)
+}
+
+/// A note, if it is there and whole.
+fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
