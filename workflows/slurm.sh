@@ -2,7 +2,7 @@
 # Workers of `tetralod work` as an array of jobs, for clusters with Slurm whose nodes share the folder:
 #   tetralod part volume.vtu --parts 64 -o volume.parts
 #   sbatch --array=1-32 workflows/slurm.sh volume.parts
-# Jobs may start and end at any time, also by a limit: a task that is lost so is done by another.
+# Options of `work` may follow. Jobs may start and end at any time, also by a limit: a task that is lost so is done by another.
 #SBATCH --job-name=tetralod
 #SBATCH --array=1-8
 #SBATCH --cpus-per-task=1
@@ -10,4 +10,5 @@
 #SBATCH --mem=8G
 #SBATCH --time=04:00:00
 set -eu
-exec "${TETRALOD:-tetralod}" work "${1:?the folder of tetralod part is missing}" --threads "${SLURM_CPUS_PER_TASK:-1}"
+: "${1:?the folder of tetralod part is missing}"
+exec "${TETRALOD:-tetralod}" work "$@" --threads "${SLURM_CPUS_PER_TASK:-1}"
