@@ -47,7 +47,10 @@ const ELSEWHERE = {
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
   "docs/hosting.md": ["sh: needs an account of S3"],
-  "docs/howto/cluster.md": ["sh: needs a cluster; `cargo xtask test workflows` runs Snakemake and the script for Slurm here, cli/tests/command/work.rs workers", "dockerfile: needs a registry"],
+  "docs/howto/cluster.md": [
+    "sh: needs a cluster; `cargo xtask test workflows` runs Snakemake and the script for Slurm here, cli/tests/command/work.rs workers",
+    "dockerfile: needs a registry",
+  ],
   "docs/howto/deformed.md": ["sh: the commands of movies.md are run"],
   "docs/howto/movies.md": ["sh: needs ffmpeg"],
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],

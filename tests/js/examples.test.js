@@ -20,6 +20,7 @@ const project = new URL("target/examples/", root);
 const pictures = new URL("target/e2e/", root);
 const at = (name) => fileURLToPath(new URL(name, project));
 
+/** @param {string[]} args @param {string | URL} folder */
 const npm = (args, folder = project) =>
   promisify(execFile)("npm", args, { cwd: folder, shell: process.platform === "win32" }).catch((error) =>
     assert.fail(`npm ${args.join(" ")}: ${error.stdout}${error.stderr}`),
