@@ -51,7 +51,7 @@ export function showGrowth() {
   const arrived = element("b", {}, size(receivedBytes));
   const origin = originOf();
   const before = origin ? `${size(origin.bytes)} as ${origin.format}` : `${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU`;
-  const software = viewer().isSoftware ? [element("small", {}, "No GPU: drawn in software", element("span", {}, ", coarser while something moves"))] : [];
+  const software = viewer().isSoftware ? [" ", element("small", {}, "No GPU: drawn in software", element("span", {}, ", coarser while something moves"))] : [];
   const words = [`${count(tetrahedra)} tetrahedra: `, element("span", {}, `${before}, `), whole];
   $("growth").replaceChildren(...words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched", ...software);
 }
