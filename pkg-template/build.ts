@@ -164,6 +164,11 @@ export interface CoreBuildOptions {
   /** Whether fields at cells become fields at points: the mean of the cells around, weighted by volume. `averaged` of the report says what that does to them. */
   cellToPoint?: boolean;
   /**
+   * Gives points where regions meet (`preserve`) one value in fields that were at cells, the mean of all cells around. By default files of kind
+   * `half-edge` keep a value for each region there, from the cells of that region alone.
+   */
+  meanAcrossRegions?: boolean;
+  /**
    * What is repaired: nothing (a mesh that needs it is refused), what has only one sensible repair, or also points that lie on each other,
    * where that closes open seams or joins blocks that touch. Default: `"safe"`.
    */

@@ -11,6 +11,7 @@ use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo, Regions};
 use tetralod::refine;
 use tetralod::session::Session;
 use tetralod_build::measure::{Part, Promise, Reference, deviation};
+use tetralod_build::verify::split;
 
 /// Takes the mesh out of an MT file that is as coarse as a request allows.
 #[derive(clap::Args)]
@@ -176,6 +177,7 @@ fn keep<T>(list: &mut Vec<T>, kept: &[bool]) {
 fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
     let opened = &answer.opened;
     let reference = input::read_reference(&[input.to_owned()], opened)?;
+    let reference = split(&reference, opened.session.regions()).map_err(anyhow::Error::msg)?.mesh;
     let info = opened.info()?;
     let name = &info.fields[answer.field].name;
     let field = reference.fields.iter().find(|field| info.fields[answer.field].is_of(field));

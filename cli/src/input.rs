@@ -5,7 +5,7 @@ use super::{machine, output};
 use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, repair_at};
+use tetralod::mesh::{CellsToPoints, RepairLevel, RepairReport, TetMesh, repair_at};
 use tetralod::mt::MultiTessellation;
 use tetralod_build::verify::Reference;
 use tetralod_io as io;
@@ -187,7 +187,10 @@ pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
 pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let fields = &opened.info()?.fields;
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
-    let labels = opened.mt()?.regions().map_or(&[][..], |regions| &regions.arrays);
+    let regions = opened.mt()?.regions();
+    let labels = regions.map_or(&[][..], |regions| &regions.arrays);
+    let jumps = regions.is_some_and(|regions| !regions.sides.jumps.is_empty());
+    let to_points = if jumps { CellsToPoints::ByRegion } else { CellsToPoints::AcrossRegions };
     let wanted = FieldSelection { names: &names, all: false, labels, cells: CellData::Values };
     // Of several time steps it may have been built from one.
     let time = fields.first().and_then(|field| field.time);
@@ -201,7 +204,7 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
         mesh.expand_grid();
     }
     if !mesh.is_grid_alone() {
-        mesh.settle_cells(true, labels);
+        mesh.settle_cells(to_points, labels);
         mesh.add_geometry_fields(wanted.names);
     }
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {

@@ -30,6 +30,7 @@ def build(
     fields: Sequence[str] = (),
     all_fields: bool = False,
     cell_to_point: bool = False,
+    mean_across_regions: bool = False,
     units: Mapping[str, str] | None = None,
     metadata: Mapping[str, str] | None = None,
     step: int | None = None,
@@ -76,7 +77,10 @@ def build(
         The fields to keep, or vectors with all components; or all. By default the first that neither numbers something nor says where it is;
         of a vector its length.
     ``cell_to_point``
-        Turns fields at cells into fields at points, the mean of the cells around; ``report["averaged"]`` says what that does.
+        Turns fields at cells into fields at points, the mean of the cells around; ``report["averaged"]`` says what that does. With
+        ``preserve``, where regions meet, a point gets a value for each of them, from the cells of that region alone.
+    ``mean_across_regions``
+        Gives such points one value instead, the mean of the cells of all regions.
     ``units``, ``metadata``
         Units of fields or vectors by their names; entries for the file.
     ``step``
@@ -126,6 +130,7 @@ def build(
         "fields": _options.names("fields", fields),
         "all_fields": all_fields,
         "cell_to_point": cell_to_point,
+        "mean_across_regions": mean_across_regions,
         "repair": repair,
         "weld_distance": None if weld_distance is None else _options.amount("weld_distance", weld_distance),
         "units": list((units or {}).items()),

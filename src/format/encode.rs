@@ -64,6 +64,7 @@ fn encode_kind<C: Codec>(
     put(&header(Start {
         total: Some(total),
         tet_errors: mt.has_tet_errors(),
+        sides: mt.regions().is_some_and(|regions| !regions.sides.jumps.is_empty()),
         exact: !has_index && !exact.is_empty(),
     }))?;
     for section in sections.iter().chain([&end]) {

@@ -16,6 +16,8 @@ pub const END_BYTES: usize = HEAD_BYTES + 12;
 const CRITICAL_FLAGS: u32 = 0xFFFF;
 /// Of these: updates contain errors of the tetrahedra that they remove.
 const TET_ERRORS: u32 = 1;
+/// And: vertices have values for each region.
+const SIDES: u32 = 1 << 1;
 /// A hint in files without an index: exact values stand behind the updates.
 const EXACT: u32 = 1 << 16;
 
@@ -26,6 +28,8 @@ pub struct Start {
     pub total: Option<u64>,
     /// Whether updates contain errors of the tetrahedra that they remove.
     pub tet_errors: bool,
+    /// Whether vertices have values for each region, as `regn` then says of which fields.
+    pub sides: bool,
     /// Whether exact values stand behind the updates, as far as the header says so: it does where there is no index.
     pub exact: bool,
 }
@@ -33,7 +37,7 @@ pub struct Start {
 /// A header.
 pub fn header(start: Start) -> [u8; HEADER_BYTES] {
     let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
-    let flags = flag(start.tet_errors, TET_ERRORS) | flag(start.exact, EXACT);
+    let flags = flag(start.tet_errors, TET_ERRORS) | flag(start.sides, SIDES) | flag(start.exact, EXACT);
     let mut bytes = [0; HEADER_BYTES];
     bytes[..8].copy_from_slice(&MAGIC);
     bytes[8..10].copy_from_slice(&VERSION.to_le_bytes());
@@ -63,7 +67,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
         return Err(FormatError::UnsupportedVersion { found, supported: VERSION });
     }
     let flags = u32_at(12);
-    if flags & CRITICAL_FLAGS & !TET_ERRORS != 0 {
+    if flags & CRITICAL_FLAGS & !(TET_ERRORS | SIDES) != 0 {
         return Err(FormatError::UnsupportedFeature {
             offset: 12,
             what: "a flag that this reader does not know",
@@ -73,6 +77,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
     Ok(Start {
         total: (total != 0).then_some(total),
         tet_errors: flags & TET_ERRORS != 0,
+        sides: flags & SIDES != 0,
         exact: flags & EXACT != 0,
     })
 }

@@ -2,32 +2,46 @@
 
 use crate::geom::bits_of;
 use crate::mesh::adjacency::components;
-use crate::mesh::{Averaged, Difference, Extreme, Extremes, Field, MeshInput, TetMesh, neighbors};
+use crate::mesh::{
+    Averaged, Difference, Extreme, Extremes, Field, MeshInput, NONE, Side, TetMesh, neighbors,
+};
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 /// The label that is the number of the part that a cell is in.
 pub const COMPONENTS: &str = "components";
 
+/// What becomes of fields at cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellsToPoints {
+    /// Only their names are kept.
+    No,
+    /// They are averaged over all cells around a point.
+    AcrossRegions,
+    /// They are averaged over the cells around a point that are in one region, for each of its regions.
+    ByRegion,
+}
+
 impl TetMesh {
     /// Turns fields at cells into fields at points, or leaves their values out. Those that are labels stay as well; the label
     /// [`COMPONENTS`] is made where there is none of this name, and the mesh is sound.
     #[doc(hidden)]
-    pub fn settle_cells(&mut self, to_points: bool, labels: &[String]) {
+    pub fn settle_cells(&mut self, to_points: CellsToPoints, labels: &[String]) {
         let is_label = |field: &&Field| labels.contains(&field.name);
-        let kept: Vec<Field> = self.cell_fields.iter().filter(is_label).cloned().collect();
-        match to_points {
-            true => self.cells_to_points(),
-            false => self.cell_fields.iter_mut().for_each(|field| field.values = Vec::new()),
-        }
-        self.cell_fields.extend(kept);
+        let mut kept: Vec<Field> = self.cell_fields.iter().filter(is_label).cloned().collect();
         let is_it = |field: &Field| field.name == COMPONENTS;
         let MeshInput { other_fields, other_cell_fields, .. } = &self.input;
         let mut known =
             self.cell_fields.iter().chain(&self.fields).chain(other_fields).chain(other_cell_fields);
         if labels.iter().any(|name| name == COMPONENTS) && !known.any(is_it) {
-            self.cell_fields.extend(self.components());
+            kept.extend(self.components());
         }
+        match to_points {
+            CellsToPoints::No => self.cell_fields.iter_mut().for_each(|field| field.values = Vec::new()),
+            CellsToPoints::AcrossRegions => self.cells_to_points(),
+            CellsToPoints::ByRegion => self.average_cells(&kept, labels),
+        }
+        self.cell_fields.extend(kept);
     }
 
     /// The parts that hang together by faces, counted from 1 in the order of their first cells.
@@ -48,6 +62,21 @@ impl TetMesh {
     /// Points without cells get 0; [`repair`](crate::mesh::repair) drops them, and turns cells whose volume would
     /// otherwise count as negative.
     pub fn cells_to_points(&mut self) {
+        self.average_cells(&[], &[]);
+    }
+
+    /// As [`TetMesh::cells_to_points`], but for each region apart: a point at which several regions meet gets a value for each of them, the
+    /// mean of the cells around it in that region. Regions are told apart by the arrays `labels`, at cells, or at points, of which the least
+    /// of a tetrahedron counts. In a point's first region, by the labels in ascending order, its value is in [`Field::values`], in each
+    /// further one, in [`Field::sides`]. To be called once the mesh is sound: what changes its points or tetrahedra knows nothing of sides.
+    pub fn cells_to_points_by_region(&mut self, labels: &[String]) {
+        let is_label = |field: &&Field| labels.contains(&field.name);
+        let kept: Vec<Field> = self.cell_fields.iter().filter(is_label).cloned().collect();
+        self.average_cells(&kept, labels);
+    }
+
+    /// Turns fields at cells into fields at points, for each region by these labels, some of which are not among the fields of the mesh.
+    fn average_cells(&mut self, own: &[Field], labels: &[String]) {
         let (read, named) = std::mem::take(&mut self.cell_fields)
             .into_iter()
             .partition::<Vec<Field>, _>(|field| field.values.len() == self.tets.len());
@@ -56,12 +85,14 @@ impl TetMesh {
             return;
         }
         let volumes = self.relative_volumes();
+        let parting = self.parting(own, labels);
         // Time steps share a name.
         let key = |field: &Field| (field.name.clone(), field.time.map(bits_of));
         let mut taken: HashSet<_> = self.fields.iter().map(key).collect();
         for mut field in read {
-            let means = self.mean_of_cells(&field.values, &volumes);
-            field.averaged = self.averaged(&field.values, &means, &volumes);
+            let mut means = self.mean_of_cells(&field.values, &volumes, &parting);
+            field.averaged = self.averaged(&field.values, &means, &volumes, &parting);
+            field.sides = means.split_off(self.positions.len());
             field.values = means;
             field.integer = false;
             while !taken.insert(key(&field)) {
@@ -70,18 +101,50 @@ impl TetMesh {
             }
             self.fields.push(field);
         }
+        self.sides = parting.sides;
     }
 
-    /// The mean at each point of the cells around it, weighted by their volumes: however they are split into tetrahedra.
-    fn mean_of_cells(&self, values: &[f64], volumes: &[f64]) -> Vec<f64> {
-        let mut means = vec![0.0; self.positions.len()];
-        let mut weights = vec![0.0; self.positions.len()];
+    /// Where regions meet, by these labels.
+    fn parting(&self, own: &[Field], labels: &[String]) -> Parting {
+        let mut regions = vec![0_u32; self.tets.len()];
+        for name in labels {
+            let is_it = |field: &&Field| field.name == *name;
+            let at_cells = own.iter().find(|field| is_it(field) && field.values.len() == self.tets.len());
+            let at_points = self.fields.iter().find(is_it);
+            let label = |t: usize| match (at_cells, at_points) {
+                (Some(field), _) => field.values[t],
+                (None, Some(field)) => {
+                    self.tets[t].map(|v| field.values[v as usize]).into_iter().fold(f64::INFINITY, f64::min)
+                }
+                // Whoever needs the regions says so.
+                (None, None) => 0.0,
+            };
+            // Both zeros are one label.
+            let keys: Vec<(u32, f64)> =
+                regions.iter().enumerate().map(|(t, &region)| (region, label(t) + 0.0)).collect();
+            let order = |a: &(u32, f64), b: &(u32, f64)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
+            let mut known = keys.clone();
+            known.sort_unstable_by(order);
+            known.dedup_by(|a, b| order(a, b).is_eq());
+            let number =
+                |key: &(u32, f64)| known.binary_search_by(|known| order(known, key)).unwrap_or(0) as u32;
+            regions = keys.iter().map(number).collect();
+        }
+        Parting::new(self.positions.len(), &self.tets, regions)
+    }
+
+    /// The mean at each point of the cells around it, weighted by their volumes: however they are split into tetrahedra. Then those in
+    /// further regions.
+    fn mean_of_cells(&self, values: &[f64], volumes: &[f64], parting: &Parting) -> Vec<f64> {
+        let mut means = vec![0.0; self.positions.len() + parting.sides.len()];
+        let mut weights = vec![0.0; means.len()];
         for cell in self.cells() {
             let (value, volume) = (values[cell.start], volumes[cell.clone()].iter().sum::<f64>());
+            let region = parting.regions[cell.start];
             let mut corners: Vec<u32> = self.tets[cell].as_flattened().to_vec();
             corners.sort_unstable();
             corners.dedup();
-            for v in corners.into_iter().map(|v| v as usize) {
+            for v in corners.into_iter().map(|v| parting.place(v, region)) {
                 weights[v] += volume;
                 // A running mean stays between the values that it is of: no sum that could overflow.
                 if weights[v] > 0.0 {
@@ -93,17 +156,24 @@ impl TetMesh {
         means
     }
 
-    /// What averaging has done: `values` of cells have become `means` at points.
-    fn averaged(&self, values: &[f64], means: &[f64], volumes: &[f64]) -> Option<Averaged> {
+    /// What averaging has done: `values` of cells have become `means` at points, and in further regions.
+    fn averaged(
+        &self,
+        values: &[f64],
+        means: &[f64],
+        volumes: &[f64],
+        parting: &Parting,
+    ) -> Option<Averaged> {
         let mut ends: Option<[Range<usize>; 2]> = None;
         let (mut largest, mut squares, mut whole) = (0.0_f64, 0.0, 0.0);
         for cell in self.cells() {
             let value = values[cell.start];
+            let region = parting.regions[cell.start];
             let (mut volume, mut mean) = (0.0, 0.0);
             for t in cell.clone() {
                 volume += volumes[t];
                 let share = volumes[t] / volume;
-                let of_tet: f64 = self.tets[t].iter().map(|&v| 0.25 * means[v as usize]).sum();
+                let of_tet: f64 = self.tets[t].iter().map(|&v| 0.25 * means[parting.place(v, region)]).sum();
                 mean = mean * (1.0 - share) + of_tet * share;
             }
             let difference = (mean - value).abs();
@@ -167,6 +237,57 @@ impl TetMesh {
             u.cross(v).dot(w).abs().max(f64::MIN_POSITIVE)
         };
         self.tets.iter().map(volume).collect()
+    }
+}
+
+/// Which regions meet at which points.
+struct Parting {
+    /// The region of each tetrahedron.
+    regions: Vec<u32>,
+    points: usize,
+    sides: Vec<Side>,
+    /// Where the sides of each point begin, and those of the last end; empty without any.
+    starts: Vec<u32>,
+}
+
+impl Parting {
+    fn new(points: usize, tets: &[[u32; 4]], regions: Vec<u32>) -> Self {
+        if regions.iter().all(|region| *region == regions[0]) {
+            return Self { regions, points, sides: Vec::new(), starts: Vec::new() };
+        }
+        // A tetrahedron for each point and region: first those at points that are in one region alone.
+        let mut alone = vec![NONE; points];
+        let mut several: Vec<[u32; 3]> = Vec::new();
+        for (t, tet) in (0..).zip(tets) {
+            for &v in tet {
+                let first = &mut alone[v as usize];
+                if *first == NONE {
+                    *first = t;
+                } else if regions[*first as usize] != regions[t as usize] {
+                    several.push([v, regions[*first as usize], *first]);
+                    several.push([v, regions[t as usize], t]);
+                }
+            }
+        }
+        several.sort_unstable();
+        several.dedup_by_key(|[v, region, _]| [*v, *region]);
+        let mut sides = Vec::new();
+        let mut starts = vec![0; points + 1];
+        for own in several.chunk_by(|a, b| a[0] == b[0]) {
+            starts[own[0][0] as usize + 1] = own.len() as u32 - 1;
+            sides.extend(own[1..].iter().map(|&[point, _, tet]| Side { point, tet }));
+        }
+        (0..points).for_each(|v| starts[v + 1] += starts[v]);
+        Self { regions, points, sides, starts }
+    }
+
+    /// The place of the value of a point in a region.
+    fn place(&self, point: u32, region: u32) -> usize {
+        let v = point as usize;
+        let Some(&[start, end]) = self.starts.get(v..v + 2).and_then(<[u32]>::first_chunk) else { return v };
+        let mut own = start as usize..end as usize;
+        let found = own.find(|&side| self.regions[self.sides[side].tet as usize] == region);
+        found.map_or(v, |side| self.points + side)
     }
 }
 

@@ -48,9 +48,16 @@ impl ChangedBlocks {
 
     /// The ranges of blocks that have changed, as far as there are `len` entries, and forgets them.
     pub fn take(&mut self, len: usize) -> Vec<Range<u32>> {
+        let ranges = self.ranges(len);
+        self.words.fill(0);
+        ranges
+    }
+
+    /// The ranges of blocks that have changed, as far as there are `len` entries.
+    pub fn ranges(&self, len: usize) -> Vec<Range<u32>> {
         let mut ranges: Vec<Range<u32>> = Vec::new();
-        for (i, word) in self.words.iter_mut().enumerate() {
-            let mut bits = std::mem::take(word);
+        for (i, &word) in self.words.iter().enumerate() {
+            let mut bits = word;
             while bits != 0 {
                 let block = i as u32 * 64 + bits.trailing_zeros();
                 bits &= bits - 1;

@@ -10,6 +10,9 @@ pub struct Field {
     pub name: String,
     /// One value per point, in the order of [`TetMesh::positions`](crate::mesh::TetMesh::positions); of fields at cells, one per tetrahedron.
     pub values: Vec<f64>,
+    /// Where it jumps between regions, its values at the points in further regions, in the order of
+    /// [`TetMesh::sides`](crate::mesh::TetMesh::sides); empty if it does not.
+    pub sides: Vec<f64>,
     /// The unit of the values; empty if it is not known.
     pub unit: String,
     /// Set when the field is a part of a vector or tensor.
@@ -36,12 +39,19 @@ impl Field {
         Self {
             name,
             values: Vec::new(),
+            sides: Vec::new(),
             unit,
             vector,
             time: *time,
             integer: *integer,
             averaged: averaged.clone(),
         }
+    }
+
+    /// The values at all points and, where it jumps, in all of their regions.
+    #[doc(hidden)]
+    pub fn all_values(&self) -> impl Iterator<Item = &f64> {
+        self.values.iter().chain(&self.sides)
     }
 
     /// Whether a user who asks for `name` means this field: it has this name, or it is a component (not the length) of

@@ -28,7 +28,7 @@ pub use adjacency::{DisjointSets, FaceTable, Topology, boundary_faces, match_fac
 #[doc(hidden)]
 pub use bit_set::BitSet;
 #[doc(hidden)]
-pub use cell_data::COMPONENTS;
+pub use cell_data::{COMPONENTS, CellsToPoints};
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 #[doc(hidden)]
 pub use check::{check, check_arrays, check_topology};
@@ -65,4 +65,6 @@ pub use straighten::straighten;
 #[doc(hidden)]
 pub use tet::{EDGES, MAX_TETS, REGION_COLORS};
 pub use tet::{FACES, NONE};
+#[doc(hidden)]
+pub use tet_mesh::Side;
 pub use tet_mesh::{Grid, TetMesh};

@@ -15,6 +15,15 @@ pub struct Grid {
     pub spacing: [f64; 3],
 }
 
+/// A point in one of the regions that meet there, besides the first of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Side {
+    /// The point.
+    pub point: u32,
+    /// A tetrahedron of the region that has the point as a corner.
+    pub tet: u32,
+}
+
 /// A tetrahedral mesh with scalar fields at its points: plain arrays that need not be valid. What it was read from does not
 /// count when two are compared.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +38,9 @@ pub struct TetMesh {
     pub grid: Option<Grid>,
     /// Scalar fields at the cells, each as long as `tets`; without values where only their names were asked for.
     pub cell_fields: Vec<Field>,
+    /// Points at which several regions meet, for fields that have a value there for each of them: see
+    /// [`TetMesh::cells_to_points_by_region`].
+    pub sides: Vec<Side>,
     /// What its reader left out of the file, or took in a way that the file does not state: in words, for users.
     pub notes: Vec<String>,
     /// What is known of the input that it was read from.
@@ -37,12 +49,13 @@ pub struct TetMesh {
 
 impl PartialEq for TetMesh {
     fn eq(&self, other: &Self) -> bool {
-        let Self { positions, fields, tets, grid, cell_fields, input: _, notes: _ } = self;
+        let Self { positions, fields, tets, grid, cell_fields, sides, input: _, notes: _ } = self;
         *positions == other.positions
             && *fields == other.fields
             && *tets == other.tets
             && *grid == other.grid
             && *cell_fields == other.cell_fields
+            && *sides == other.sides
     }
 }
 

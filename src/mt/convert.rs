@@ -15,6 +15,9 @@ impl Mt {
         let from = self.info().kind;
         match (from, to) {
             _ if from == to => Ok(self.clone()),
+            _ if self.regions().is_some_and(|regions| !regions.sides.jumps.is_empty()) => {
+                Err(ConvertError::Sides { to })
+            }
             // Both are made of vertex insertions.
             (MtKind::Vertex, MtKind::HalfEdge) | (MtKind::HalfEdge, MtKind::Vertex) => {
                 ExplicitMt::of(self)?.compact(to)

@@ -28,6 +28,12 @@ pub enum ConvertError {
         /// What is in the way.
         why: &'static str,
     },
+    /// Vertices have values for each region, which no other kind keeps.
+    #[error("fields have values for each region, which an MT of kind {} does not keep: build it again from the mesh", .to.name())]
+    Sides {
+        /// The kind that it should become.
+        to: MtKind,
+    },
     /// The MT is damaged.
     #[error("the MT is damaged: {0}")]
     Damaged(ReplayError),

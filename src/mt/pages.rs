@@ -208,6 +208,12 @@ pub(super) struct Rows<T> {
     items: Vec<T>,
 }
 
+impl<T: Copy> Default for Rows<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<T: Copy> Rows<T> {
     pub fn new() -> Self {
         Self { starts: vec![0], items: Vec::new() }

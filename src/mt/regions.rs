@@ -47,6 +47,17 @@ pub struct Regions {
     pub of_base: Vec<u16>,
     /// How far interfaces between regions are from those of the reference mesh in any mesh, in model units: 0 if they are the same sets of points.
     pub deviation: f64,
+    /// The values of vertices at which several regions meet.
+    pub sides: BaseSides,
+}
+
+/// Which fields jump where regions meet, and the levels of the base vertices there.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BaseSides {
+    /// For each field of the MT whether a vertex has a value for each region that it is in; empty if no field jumps.
+    pub jumps: Vec<bool>,
+    /// The levels of base vertices in each of their regions but the first: vertex by vertex, the regions ascending, field by field.
+    pub levels: Vec<i32>,
 }
 
 /// Most regions of an MT.
@@ -94,8 +105,23 @@ impl Regions {
         let own = |region: &RegionInfo| {
             size_of::<RegionInfo>() + region.name.len() + size_of_val(&region.labels[..])
         };
-        (size_of_val(&self.of_base[..]) + self.all.iter().map(own).sum::<usize>()) as u64
+        let sides = size_of_val(&self.sides.levels[..]);
+        (sides + size_of_val(&self.of_base[..]) + self.all.iter().map(own).sum::<usize>()) as u64
     }
+}
+
+/// The regions of each of so many vertices, ascending, given those of the tetrahedra.
+pub fn regions_of_vertices(vertices: usize, tets: &[[u32; 4]], regions: &[u16]) -> Vec<Vec<u16>> {
+    let mut all = vec![Vec::new(); vertices];
+    for (tet, &region) in tets.iter().zip(regions) {
+        for &v in tet {
+            let own = &mut all[v as usize];
+            if let Err(place) = own.binary_search(&region) {
+                own.insert(place, region);
+            }
+        }
+    }
+    all
 }
 
 /// Tetrahedra, volume, box and colour of each of so many regions in a mesh whose lattice has these steps.

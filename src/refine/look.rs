@@ -63,7 +63,7 @@ pub(super) fn see(
     judge: impl FnOnce(&TetData<'_>) -> Verdict,
 ) -> Verdict {
     let corners = tet.map(|v| mesh.positions[v as usize]);
-    let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
+    let levels = |field: usize| tet.map(|v| mesh.levels(mesh.side(v, mesh.region(t)))[field]);
     let TetErrors { largest: error, ref by_field } = *errors;
     let (corners, levels, region) = (&corners, &levels, mesh.region(t));
     judge(&TetData { corners, levels, error, errors: by_field, update, region })

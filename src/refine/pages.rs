@@ -115,7 +115,7 @@ impl Front {
     /// The largest excess of a tetrahedron whose remover is present; 1 if none violates the criterion. Under a budget, what has a smaller
     /// excess does not come before it.
     pub fn largest_present_excess(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> f64 {
-        let tets = (0..).zip(self.mesh.tets());
+        let tets = (0..).zip(&self.mesh.tets);
         let removed = tets.filter_map(|(t, tet)| Some((t, tet, mt.remover(&self.mesh, t)?)));
         let excesses = removed.map(|(t, tet, u)| {
             let errors = TetErrors::of(mt, &self.mesh, t, u);
@@ -134,7 +134,7 @@ impl Front {
         bounds: impl Fn(u32) -> Vec<ErrorCode>,
     ) -> Vec<u32> {
         let mut pages = Vec::new();
-        for (t, tet) in (0..).zip(self.mesh.tets()) {
+        for (t, tet) in (0..).zip(&self.mesh.tets) {
             let Some(u) = mt.remover(&self.mesh, t) else { continue };
             let page = page_of(u);
             // Neighbouring tetrahedra are often removed by updates of one page.

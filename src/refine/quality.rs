@@ -67,7 +67,7 @@ impl Front {
         let to_come = to_come_by_field(mt);
         let incomplete = mt.present() < mt.info().updates;
         let mut all = Violations { error: ErrorCode::ZERO, excess: 1.0, missing: false };
-        for (t, tet) in (0..).zip(self.mesh.tets()) {
+        for (t, tet) in (0..).zip(&self.mesh.tets) {
             let (update, errors) = self.errors_of(mt, t, &to_come);
             let missing = incomplete && (update.is_none() || unlimited);
             // The last number: regions are not widened.
@@ -110,7 +110,7 @@ impl Front {
     /// bound; zero for tetrahedra of the reference mesh.
     pub fn tet_errors(&self, mt: &impl ApplyUpdates) -> Vec<ErrorCode> {
         let to_come = to_come_by_field(mt);
-        (0..self.mesh.tets().len() as u32).map(|t| self.measured_error(mt, t, &to_come)).collect()
+        (0..self.mesh.tet_slots() as u32).map(|t| self.measured_error(mt, t, &to_come)).collect()
     }
 
     /// [`Front::tet_errors`] of one tetrahedron of the mesh.
@@ -128,7 +128,7 @@ impl Front {
     pub fn errors_by_region(&self, mt: &impl ApplyUpdates, field: usize, regions: usize) -> Vec<ErrorCode> {
         let to_come = to_come_by_field(mt);
         let mut all = vec![ErrorCode::ZERO; regions];
-        for t in 0..self.mesh.tets().len() as u32 {
+        for t in 0..self.mesh.tet_slots() as u32 {
             let (_, TetErrors { largest, by_field }) = self.errors_of(mt, t, &to_come);
             let error = by_field.get(field).copied().unwrap_or(largest);
             let most = &mut all[usize::from(self.mesh.region(t))];
@@ -141,7 +141,7 @@ impl Front {
     /// arrived: the update that removes it is not here, or, once the work is done as far as data allows, one
     /// that has to come before. None when all updates are here, and without a request.
     pub fn missing_tets(&self, mt: &impl ApplyUpdates) -> Vec<bool> {
-        let tets = self.mesh.tets();
+        let tets = &self.mesh.tets;
         let Some(goal) = self.goal.as_ref().filter(|_| mt.present() < mt.info().updates) else {
             return vec![false; tets.len()];
         };

@@ -485,7 +485,12 @@ impl Session {
         let Some(mesh) = self.mesh() else { return Err(SessionError::NotReady) };
         let table = |field: usize| {
             let values = self.exact_values(field).into_iter().zip(0..);
-            Exact::new(field, values.map(|(value, slot)| (mesh.vertex(slot), value)).collect())
+            // A vertex may have several slots: fields that jump have no exact values, others have the same in all of them.
+            let of_vertex = |(value, slot): (f64, u32)| {
+                let vertex = mesh.vertex(slot);
+                (mesh.slot(vertex) == Some(slot)).then_some((vertex, value))
+            };
+            Exact::new(field, values.filter_map(of_vertex).collect())
         };
         Ok(fields.into_iter().map(table).collect())
     }

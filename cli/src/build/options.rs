@@ -61,6 +61,10 @@ pub struct BuildOptions {
     /// and kept in the file.
     #[arg(long)]
     pub(super) cell_to_point: bool,
+    /// With --preserve, average fields at cells over all cells around a point. If not given, files of kind half-edge keep a value for each
+    /// region that meets there.
+    #[arg(long, requires = "cell_to_point")]
+    pub(super) mean_across_regions: bool,
     #[command(flatten)]
     pub repair: RepairOptions,
     /// The unit of a field or vector (repeatable).

@@ -1,6 +1,7 @@
 //! How to build: the options of all methods.
 
 use crate::method::Construction;
+use tetralod::mesh::CellsToPoints;
 use tetralod::mt::MtKind;
 
 /// How to build.
@@ -84,6 +85,14 @@ impl BuildConfig {
             keep_points: Vec::new(),
             block_bits: kind.usual_block_bits(),
         }
+    }
+
+    /// What fields at cells become where they become fields at points, unless they are to be averaged across regions: for each region apart
+    /// if there are any, and the kind can keep that.
+    #[doc(hidden)]
+    pub fn cells_to_points(&self, across_regions: bool) -> CellsToPoints {
+        let keeps_sides = self.construction.kind() == MtKind::HalfEdge && !self.preserve.is_empty();
+        if keeps_sides && !across_regions { CellsToPoints::ByRegion } else { CellsToPoints::AcrossRegions }
     }
 }
 

@@ -200,7 +200,7 @@ impl MeshBuilder {
         options: BuildOptions,
         mut stages: Stages<'_>,
     ) -> Result<JsBuilt, WebError> {
-        let BuildOptions { config, cells, repair: level, units, metadata } = options;
+        let BuildOptions { config, cells, to_points, repair: level, units, metadata } = options;
         let name = steps.first().map(|step| step.name.clone()).unwrap_or_default();
         let left_out = self.files.left_out();
         let mesh = self.read(steps, &config, cells, &mut stages)?;
@@ -218,7 +218,7 @@ impl MeshBuilder {
             let found = mesh::findings(&mesh, level.weld_distance()).map_err(bad_mesh)?;
             (mesh, Some((done, RepairObject::of(level, &done, &found))))
         };
-        mesh.settle_cells(cells, &config.preserve);
+        mesh.settle_cells(to_points, &config.preserve);
         mesh.add_geometry_fields(&config.fields);
         let unknown = |(name, _): &(String, String)| {
             WebError::bad_option("units", &format!("there is no field '{name}'"))

@@ -2,7 +2,7 @@
 
 use js_sys::Object;
 use std::ops::RangeInclusive;
-use tetralod::mesh::RepairLevel;
+use tetralod::mesh::{CellsToPoints, RepairLevel};
 use tetralod::mt::MtKind;
 use tetralod_build::{
     BuildConfig, BuildCriterion, Construction, ConstructionChoice, FieldPrecision, Method, Purpose,
@@ -13,7 +13,7 @@ use tetralod_web_options::read_error::ReadError;
 use wasm_bindgen::JsValue;
 
 /// The names of all options.
-const NAMES: [&str; 24] = [
+const NAMES: [&str; 25] = [
     "kind",
     "method",
     "criterion",
@@ -22,6 +22,7 @@ const NAMES: [&str; 24] = [
     "fields",
     "allFields",
     "cellToPoint",
+    "meanAcrossRegions",
     "repair",
     "weldDistance",
     "units",
@@ -45,6 +46,8 @@ pub struct BuildOptions {
     pub config: BuildConfig,
     /// Whether fields at cells become fields at points.
     pub cells: bool,
+    /// What they become.
+    pub to_points: CellsToPoints,
     /// What is mended in the mesh.
     pub repair: RepairLevel,
     /// Units of fields or vectors.
@@ -113,7 +116,11 @@ fn read(given: &Given, construction: Construction, default: BuildConfig) -> Resu
         return Err(given.refuse("metadata", &format!("the key \"{key}\" is empty or reserved")));
     }
     let (cells, repair) = (given.answer("cellToPoint")?, repair(given)?);
-    Ok(BuildOptions { config, cells, repair, units: pairs(given, "units")?, metadata })
+    let to_points = match (given.answer("meanAcrossRegions")?, cells) {
+        (_, false) => CellsToPoints::No,
+        (across, true) => config.cells_to_points(across),
+    };
+    Ok(BuildOptions { config, cells, to_points, repair, units: pairs(given, "units")?, metadata })
 }
 
 fn is_reserved(key: &str) -> bool {

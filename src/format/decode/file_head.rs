@@ -28,6 +28,8 @@ pub(super) struct FileHead {
     pub(super) histograms: Option<Histograms>,
     /// Until the base mesh is there; then they are in the MT.
     pub(super) regions: Option<RegionsHead>,
+    /// For each field of the file whether it jumps at interfaces; empty if none does.
+    pub(super) jumps: Vec<bool>,
     pub(super) models: Option<Models>,
     /// Until all wanted fields are there; then it is in the MT.
     pub(super) base: Option<BaseParts>,
@@ -61,6 +63,11 @@ impl FileHead {
         self.wanted.iter().position(|&wanted| wanted == field)
     }
 
+    /// Whether a field of the file jumps at interfaces.
+    pub(super) fn jumps(&self, field: usize) -> bool {
+        self.jumps.get(field).is_some_and(|jumps| *jumps)
+    }
+
     pub(super) fn fields(&self) -> usize {
         self.info.as_ref().map_or(0, |info| info.fields.len())
     }
@@ -80,7 +87,8 @@ impl FileHead {
         open.seen = expected + 1;
         let (Some(place), Some(models)) = (self.place(expected), &self.models) else { return Ok(()) };
         let mut source = Source::new(content, models)?;
-        open.fields[place] = Some(half_edge::read_field(&mut source, open.updates.len() as u32)?);
+        open.fields[place] =
+            Some(half_edge::read_field(&mut source, open.updates.len() as u32, self.jumps(expected))?);
         source.end()
     }
 

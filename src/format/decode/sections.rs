@@ -135,12 +135,21 @@ impl Decoder {
     }
 
     pub(super) fn open_regions(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
-        let FileHead { info: Some(info), index: Some(index), regions: regions @ None, models: None, .. } =
-            &mut self.head
+        let has_sides = self.head.start.sides;
+        let FileHead {
+            info: Some(info),
+            index: Some(index),
+            regions: regions @ None,
+            models: None,
+            jumps,
+            ..
+        } = &mut self.head
         else {
             return Err(content.out_of_place());
         };
-        *regions = Some(regions::read(content, info, index)?);
+        let mut found = regions::read(content, info, index, has_sides)?;
+        *jumps = std::mem::take(&mut found.jumps);
+        *regions = Some(found);
         Ok(())
     }
 
@@ -155,7 +164,8 @@ impl Decoder {
     }
 
     pub(super) fn open_base(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
-        let in_place = self.head.base_fields == 0 && self.mt.is_none();
+        let lacks_regions = self.head.start.sides && self.head.regions.is_none();
+        let in_place = self.head.base_fields == 0 && self.mt.is_none() && !lacks_regions;
         let bits = self.head.index.as_ref().map(|index| index.block_bits);
         let (FileHead { info: Some(info), models: Some(models), base: None, .. }, Some(codec), true) =
             (&self.head, self.head.codec(), in_place)
@@ -176,17 +186,22 @@ impl Decoder {
             return Err(content.out_of_place());
         }
         self.head.base_fields += 1;
-        let is_wanted = self.head.place(field).is_some();
+        let (is_wanted, jumps) = (self.head.place(field).is_some(), self.head.jumps(field));
         if let (true, FileHead { base: Some(base), models: Some(models), .. }) = (is_wanted, &mut self.head) {
-            base.read_field(content, models)?;
+            base.read_field(content, models, jumps)?;
         }
         if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len())
-            && let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info())
+            && let (Some(mut base), Some(info)) = (self.head.base.take(), self.head.wanted_info())
         {
+            let sides = base.take_sides();
             let (mut mt, in_order) = base.start(info, self.head.start.tet_errors)?;
             if let (Mt::HalfEdge(mt), Some(regions)) = (&mut mt, self.head.regions.take()) {
-                let regions = regions.of_base(mt.base().tets.len()).ok_or_else(|| {
+                let mut regions = regions.of_base(mt.base().tets.len()).ok_or_else(|| {
                     self.corrupt("the base mesh does not have as many tetrahedra as regions are stated for")
+                })?;
+                let sides = half_edge::base_sides(mt.base(), &regions.of_base, &sides);
+                regions.sides = sides.ok_or_else(|| {
+                    self.corrupt("base vertices do not have values for each of their regions")
                 })?;
                 mt.set_regions(regions)?;
             }

@@ -19,6 +19,8 @@ pub fn bound_of(upper: u8) -> ErrorCode {
 pub struct FieldPart {
     pub errors: Vec<ErrorCode>,
     pub residuals: Vec<i32>,
+    /// Where the field jumps, for each update the residuals in further regions.
+    pub sides: Option<Vec<Vec<i32>>>,
 }
 
 /// Which of the ranges that end with these numbers a number is in; what is larger is in one more.

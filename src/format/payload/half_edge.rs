@@ -12,11 +12,12 @@ use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
 use crate::format::section::Section;
-use crate::format::{EncodeError, Limits};
+use crate::format::{EncodeError, FormatError, Limits};
 use crate::mesh::NONE;
 use crate::mt::{
-    BaseMark, BaseMesh, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, HalfEdgeUpdate, MtFacts, MtInfo,
-    MtKind, MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
+    BaseMark, BaseMesh, BaseMeshError, BaseSides, ErrorCode, ForestChild, HalfEdgeMt, HalfEdgeUpdate,
+    MtFacts, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
+    regions_of_vertices,
 };
 use crate::threads;
 use std::ops::Range;
@@ -47,6 +48,10 @@ const BIT: Family = BITS.after(ROWS * COLUMNS, 2);
 const ERROR: Family = BIT.after(16, 256);
 /// Residuals of levels, by error.
 const LEVEL: Family = ERROR.numbers_after(128, 1);
+/// In how many further regions a vertex has levels of its own, by whether the one before has any.
+const SIDES: Family = LEVEL.numbers_after(2, 2);
+/// Residuals of these levels; and, of the base mesh, what each is above the one before.
+const SIDE: Family = SIDES.numbers_after(2, 1);
 
 /// Lengths of offsets in bits that have contexts of their own; longer ones use the last.
 const LENGTHS: u32 = 22;
@@ -66,10 +71,12 @@ const PARTS: Parts = &[
     ("inner faces", BIT),
     ("errors", ERROR),
     ("levels", LEVEL),
+    ("sides", SIDES),
+    ("sides", SIDE),
 ];
 
 // Families of what all kinds have follow those of edge-based MTs.
-const _: () = assert!(LEVEL.first + LEVEL.contexts <= super::BASE_LEVEL.first);
+const _: () = assert!(SIDE.first + SIDE.contexts <= super::BASE_LEVEL.first);
 
 const ROWS: u32 = 8;
 const COLUMNS: u32 = 8;
@@ -404,6 +411,7 @@ impl Insertions {
         let rows = 0..self.stars.len();
         let residuals: Vec<i32> =
             rows.clone().flat_map(|k| fields.iter().map(move |field| field.residuals[k])).collect();
+        let sides = sides_of_all(fields, self.stars.len())?;
         let errors: Vec<ErrorCode> =
             rows.clone().flat_map(|k| fields.iter().map(move |field| field.errors[k])).collect();
         let changes = rows.zip(residuals.chunks(stride).zip(errors.chunks(stride)));
@@ -411,6 +419,7 @@ impl Insertions {
             .map(|(k, (level_residuals, errors))| HalfEdgeUpdate {
                 children: &self.children[k],
                 level_residuals,
+                side_residuals: sides.get(k).map_or(&[], |own| own),
                 star: &self.stars[k],
                 errors,
             })
@@ -449,14 +458,101 @@ pub fn read(
 
 /// Puts what updates do to a field.
 fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, updates: Range<u32>, field: usize) {
-    put_changes(out, [ERROR, LEVEL], updates.map(UpdateId), |u| {
+    put_changes(out, [ERROR, LEVEL], updates.clone().map(UpdateId), |u| {
         // Whoever writes an MT has all of its updates.
         mt.update(u)
             .map_or((ErrorCode::ZERO, 0), |update| (update.errors[field], update.level_residuals[field]))
     });
+    if mt.jumps().is_some_and(|jumps| jumps[field]) {
+        let fields = mt.info().fields.len();
+        let mut before = 0;
+        for update in updates.filter_map(|u| mt.update(UpdateId(u))) {
+            let count = (update.side_residuals.len() / fields) as u32;
+            out.number(SIDES, before, count);
+            before = count;
+            let own = update.side_residuals.iter().skip(field).step_by(fields);
+            own.for_each(|&residual| out.signed(SIDE, 0, residual));
+        }
+    }
 }
 
-/// Reads what the `count` updates of a block do to a field.
-pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart> {
-    read_changes(source, [ERROR, LEVEL], count)
+/// Reads what the `count` updates of a block do to a field; `jumps`: at interfaces, too.
+pub fn read_field(source: &mut Source<'_>, count: u32, jumps: bool) -> Result<FieldPart> {
+    let mut part = read_changes(source, [ERROR, LEVEL], count)?;
+    if jumps {
+        let mut before = 0;
+        let mut all = Vec::new();
+        for _ in 0..count {
+            let count = source.number(SIDES, before)?;
+            if count > MOST_SIDES {
+                return Err(source.corrupt("a vertex has more regions than it can have"));
+            }
+            before = count;
+            all.push((0..count).map(|_| source.signed(SIDE, 0)).collect::<Result<Vec<i32>>>()?);
+        }
+        part.sides = Some(all);
+    }
+    Ok(part)
+}
+
+/// Regions of a vertex besides its first: no more than tetrahedra that an update removes.
+const MOST_SIDES: u32 = 127;
+
+/// The residuals in further regions of each of so many updates, region by region and field by field; nothing if no field jumps.
+fn sides_of_all(fields: &[FieldPart], updates: usize) -> Result<Vec<Vec<i32>>> {
+    let Some(first) = fields.iter().find_map(|field| field.sides.as_ref()) else { return Ok(Vec::new()) };
+    let own = |k: usize| {
+        let all = || fields.iter().map(|field| field.sides.as_ref().map(|sides| &sides[k]));
+        let count = first[k].len();
+        if all().flatten().any(|own| own.len() != count) {
+            let what = "a vertex does not have as many regions in each field that jumps";
+            return Err(FormatError::Corrupt { offset: 0, what });
+        }
+        // In other fields it has the same level in all regions.
+        Ok((0..count).flat_map(|i| all().map(move |own| own.map_or(0, |own| own[i]))).collect())
+    };
+    (0..updates).map(own).collect()
+}
+
+/// Which fields jump, and the levels of base vertices in further regions, given these of each field that jumps. None if they are not as many.
+pub fn base_sides(base: &BaseMesh, of_base: &[u16], of_fields: &[Option<Vec<i32>>]) -> Option<BaseSides> {
+    if of_fields.iter().all(Option::is_none) {
+        return Some(BaseSides::default());
+    }
+    let own = regions_of_vertices(base.positions.len(), &base.tets, of_base);
+    let rows: Vec<usize> = (0..).zip(&own).flat_map(|(v, own)| own.iter().skip(1).map(move |_| v)).collect();
+    if of_fields.iter().flatten().any(|levels| levels.len() != rows.len()) {
+        return None;
+    }
+    let fields = of_fields.len();
+    let level = |(row, &v): (usize, &usize), field: usize| {
+        of_fields[field].as_ref().map_or(base.values[v * fields + field], |levels| levels[row])
+    };
+    let levels = rows.iter().enumerate().flat_map(|row| (0..fields).map(move |field| level(row, field)));
+    Some(BaseSides { jumps: of_fields.iter().map(Option::is_some).collect(), levels: levels.collect() })
+}
+
+/// Puts the levels of one field that jumps at the base vertices, in each of their regions but the first.
+pub fn put_base_sides(out: &mut impl Put, levels: &[i32], fields: usize, field: usize) {
+    let mut last = 0;
+    out.number(SIDES, 0, (levels.len() / fields) as u32);
+    for &level in levels.iter().skip(field).step_by(fields) {
+        out.signed(SIDE, 1, level - last);
+        last = level;
+    }
+}
+
+/// Reads what [`put_base_sides`] puts, of a base mesh with so many tetrahedra.
+pub fn read_base_sides(source: &mut Source<'_>, tets: usize) -> Result<Vec<i32>> {
+    let count = source.number(SIDES, 0)?;
+    // Each is of a corner.
+    if u64::from(count) > 4 * tets as u64 {
+        return Err(source.corrupt("base vertices have more regions than they can have"));
+    }
+    let (mut levels, mut last) = (Vec::new(), 0_i32);
+    for _ in 0..count {
+        last = last.wrapping_add(source.signed(SIDE, 1)?);
+        levels.push(last);
+    }
+    Ok(levels)
 }

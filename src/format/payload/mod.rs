@@ -43,6 +43,10 @@ pub fn put_base_field(out: &mut impl Put, mt: &impl Codec, field: usize) {
         out.signed(BASE_LEVEL, 0, level - last);
         last = level;
     }
+    let jumping = mt.regions().map(|regions| &regions.sides).filter(|sides| !sides.jumps.is_empty());
+    if let Some(sides) = jumping.filter(|sides| sides.jumps[field]) {
+        half_edge::put_base_sides(out, &sides.levels, sides.jumps.len(), field);
+    }
 }
 
 /// Appends what stands in front of the coded part of a `BASE` section.
@@ -63,6 +67,8 @@ pub struct BaseParts {
     /// log2 of the updates of a block.
     pub block_bits: u32,
     levels: Vec<Vec<i32>>,
+    /// For each field that has arrived the levels of its base vertices in further regions, if it jumps.
+    sides: Vec<Option<Vec<i32>>>,
 }
 
 /// Vertices and tetrahedra that a byte of a base mesh can stand for at most. Symbols may take no bits: without this, a few
@@ -99,7 +105,7 @@ pub fn read_base(
     let base = base::read(&mut source, vertices, tets)?;
     let head = (codec.read_head)(&mut source, info, [vertices, tets], block_bits, limits)?;
     source.end()?;
-    Ok(BaseParts { base, head, block_bits, levels: Vec::new() })
+    Ok(BaseParts { base, head, block_bits, levels: Vec::new(), sides: Vec::new() })
 }
 
 impl BaseParts {
@@ -108,22 +114,35 @@ impl BaseParts {
         self.levels.len()
     }
 
-    /// Reads the levels of the next field.
-    pub fn read_field(&mut self, reader: Reader<'_>, models: &Models) -> Result<(), FormatError> {
+    /// Reads the levels of the next field; `jumps`: at interfaces, too.
+    pub fn read_field(
+        &mut self,
+        reader: Reader<'_>,
+        models: &Models,
+        jumps: bool,
+    ) -> Result<(), FormatError> {
         let mut source = Source::new(reader, models)?;
         let (mut levels, mut last) = (Vec::new(), 0_i32);
         for _ in 0..self.base.positions.len() {
             last = last.wrapping_add(source.signed(BASE_LEVEL, 0)?);
             levels.push(last);
         }
+        let tets = self.base.tets.len();
+        let sides = jumps.then(|| half_edge::read_base_sides(&mut source, tets)).transpose()?;
         source.end()?;
         self.levels.push(levels);
+        self.sides.push(sides);
         Ok(())
+    }
+
+    /// For each field the levels of base vertices in further regions, if it jumps.
+    pub fn take_sides(&mut self) -> Vec<Option<Vec<i32>>> {
+        std::mem::take(&mut self.sides)
     }
 
     /// The MT without updates, when all levels are there.
     pub fn start(self, info: MtInfo, tet_errors: bool) -> Result<Started, FormatError> {
-        let Self { mut base, head, block_bits, levels } = self;
+        let Self { mut base, head, block_bits, levels, .. } = self;
         let vertices = base.positions.len();
         base.values = (0..vertices).flat_map(|v| levels.iter().map(move |levels| levels[v])).collect();
         base.check(&info)?;

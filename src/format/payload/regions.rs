@@ -12,6 +12,8 @@ pub struct RegionsHead {
     regions: Regions,
     /// Regions of consecutive base tetrahedra, and how many these are.
     runs: Vec<(u16, u32)>,
+    /// For each field of the file whether it jumps; empty if none does.
+    pub jumps: Vec<bool>,
 }
 
 /// Appends the section of an MT whose blocks have this index.
@@ -46,11 +48,18 @@ pub fn write(out: &mut Vec<u8>, regions: &Regions, index: &Index) -> Result<(), 
             next = u64::from(region) + 1;
         }
     }
+    // Nothing where no field jumps.
+    out.extend(regions.sides.jumps.iter().map(|&jumps| u8::from(jumps)));
     Ok(())
 }
 
-/// Reads the section, and enters in the index which regions blocks reach.
-pub fn read(mut reader: Reader<'_>, info: &MtInfo, index: &mut Index) -> Result<RegionsHead, FormatError> {
+/// Reads the section, and enters in the index which regions blocks reach. `has_sides`: it says which fields jump.
+pub fn read(
+    mut reader: Reader<'_>,
+    info: &MtInfo,
+    index: &mut Index,
+    has_sides: bool,
+) -> Result<RegionsHead, FormatError> {
     let mut regions = Regions::default();
     for _ in 0..reader.varint()? {
         regions.arrays.push(reader.string()?.to_owned());
@@ -76,8 +85,16 @@ pub fn read(mut reader: Reader<'_>, info: &MtInfo, index: &mut Index) -> Result<
         }
         block.regions = list;
     }
+    let mut jumps = Vec::new();
+    for _ in info.fields.iter().filter(|_| has_sides) {
+        jumps.push(match reader.u8()? {
+            0 => false,
+            1 => true,
+            _ => return Err(reader.corrupt("a field jumps at interfaces or it does not")),
+        });
+    }
     reader.end()?;
-    Ok(RegionsHead { regions, runs })
+    Ok(RegionsHead { regions, runs, jumps })
 }
 
 /// The number of a region: what is read, from `next` on.

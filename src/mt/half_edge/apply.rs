@@ -6,7 +6,7 @@
 use super::new_star::{MOST, NEW};
 use super::scratch::Scratch;
 use super::star_code::{KnownStars, StarCode};
-use super::store::HalfEdgeMt;
+use super::store::{HalfEdgeMt, HalfEdgeUpdate};
 use crate::geom::orient3d;
 use crate::mesh::NONE;
 use crate::mt::error::Result;
@@ -15,6 +15,7 @@ use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{Gather, Star};
 use crate::mt::mesh::tet::corner_of;
 use crate::mt::pages::Page;
+use crate::mt::regions::regions_of_vertices;
 use crate::mt::{
     Applied, ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MultiTessellation, PageError,
     UpdateError, UpdateId, UpdatePages, VertexId,
@@ -133,12 +134,12 @@ impl HalfEdgeMt {
         let centre = mesh.positions[scratch.link[0] as usize];
         let offset = children[at].offset;
         let position = [0, 1, 2].map(|k| centre[k].saturating_add(offset[k]));
-        let residuals = self.update(u).ok_or(UpdateError::Missing { update: u.0 })?.level_residuals;
+        let HalfEdgeUpdate { level_residuals: residuals, side_residuals, .. } =
+            self.update(u).ok_or(UpdateError::Missing { update: u.0 })?;
         scratch.place(mesh, position);
-        for (level, residual) in scratch.levels.iter_mut().zip(residuals) {
-            *level = level.saturating_add(*residual);
-        }
-        if self.info().holds(position, &scratch.levels) { Ok(position) } else { Err(off) }
+        scratch.add_residuals(mesh, residuals, side_residuals).ok_or(off.clone())?;
+        let mut rows = scratch.levels.chunks(mesh.fields);
+        if rows.all(|levels| self.info().holds(position, levels)) { Ok(position) } else { Err(off) }
     }
 
     /// Gets ready to insert the vertex of `u`: star, position and levels are in the scratch space then, but not yet what
@@ -192,7 +193,11 @@ impl HalfEdgeMt {
         let slot = mesh.new_vertex();
         mesh.put_vertex(slot, Labels { vertex: self.vertex(u).0, kind_word: KindWord::NONE }, position);
         let first = slot as usize * mesh.fields;
-        mesh.levels[first..first + scratch.levels.len()].copy_from_slice(&scratch.levels);
+        let (own, sides) = scratch.levels.split_at(mesh.fields);
+        mesh.levels[first..first + own.len()].copy_from_slice(own);
+        for (&region, levels) in scratch.regions.iter().skip(1).zip(sides.chunks(mesh.fields)) {
+            mesh.add_side(slot, region, levels);
+        }
         let Scratch { slots, removed_len: moved, star, star_len: all, link, .. } = scratch;
         let (moved, all) = (*moved, *all);
         mesh.new_tets(&mut slots[moved..all]);
@@ -439,6 +444,17 @@ impl ApplyUpdates for HalfEdgeMt {
         mesh.whole_stars = true;
         if let Some(regions) = self.regions() {
             mesh.regions.clone_from(&regions.of_base);
+            if self.has_sides() {
+                mesh.keep_sides(regions.sides.jumps.clone());
+                let vertices = self.base().positions.len();
+                let of_vertices = regions_of_vertices(vertices, &self.base().tets, &regions.of_base);
+                let further = (0..)
+                    .zip(&of_vertices)
+                    .flat_map(|(v, own)| own.iter().skip(1).map(move |&region| (v, region)));
+                let rows = regions.sides.levels.chunks(mesh.fields);
+                further.zip(rows).for_each(|((v, region), levels)| mesh.add_side(v, region, levels));
+                mesh.update_corners();
+            }
         }
         Ok(mesh)
     }
@@ -486,9 +502,10 @@ impl ApplyUpdates for HalfEdgeMt {
                 if tet.contains(&near) {
                     continue;
                 }
-                let tet = tet.map(|v| if v == slot { near } else { v });
+                let region = mesh.region(t);
+                let tet = tet.map(|v| mesh.side(if v == slot { near } else { v }, region));
                 let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
-                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, 0, mesh.region(t)) {
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, 0, region) {
                     break;
                 }
             }

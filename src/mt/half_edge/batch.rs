@@ -1,6 +1,7 @@
 //! Updates that are about to be appended to a half-edge MT. First they are applied, one after the other, and their stars are taken down;
 //! then the stars are coded, each by itself.
 
+use super::builder::NextUpdate;
 use super::forest::Forest;
 use super::new_star::{NEW, NewTet};
 use super::places::Places;
@@ -10,6 +11,7 @@ use super::scratch::Scratch;
 use super::star_code::StarCode;
 use super::store::{HalfEdgeMt, HalfEdgeUpdate};
 use crate::mt::facts::MtFacts;
+use crate::mt::pages::Rows;
 use crate::mt::reaches::Reaches;
 use crate::mt::{
     Applied, ConvertError, CurrentMesh, ErrorCode, Excess, Margins, MultiTessellation, UpdateError, UpdateId,
@@ -29,6 +31,8 @@ pub(super) struct Batch {
     /// Update by update and field by field.
     levels: Vec<i32>,
     errors: Vec<ErrorCode>,
+    /// The levels of each new vertex in single regions, as they are given.
+    sides: Rows<Side>,
     /// What removes the tetrahedra that each inserts, in the order of their faces opposite the new vertex, and where those of each end.
     removers: Vec<Remover>,
     remover_ends: Vec<usize>,
@@ -38,8 +42,31 @@ pub(super) struct Batch {
     star: Vec<NewTet>,
     /// The labels of the vertices of their links, where these are, and their levels.
     link: Vec<(u32, [i32; 3])>,
+    /// Of the vertices of the link or, where fields jump, of the corners of what each removes, each once.
     link_levels: Vec<i32>,
+    /// Where fields jump.
+    jumping: Jumping,
     applied: Vec<AppliedUpdate>,
+}
+
+/// The levels of a vertex in a region.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    region: u16,
+    /// Where they begin in [`Jumping::given`].
+    first: u32,
+}
+
+/// What is taken down of updates where fields jump.
+#[derive(Default)]
+struct Jumping {
+    /// The levels of [`Side`]s.
+    given: Vec<i32>,
+    /// For each removed tetrahedron which of the levels that are taken down are those of its corners.
+    corners: Rows<[u16; 4]>,
+    /// The levels of each new vertex in its regions but the first, and what is stored of all of its levels.
+    levels: Rows<i32>,
+    residuals: Rows<i32>,
 }
 
 /// An update that has been applied.
@@ -52,6 +79,7 @@ struct AppliedUpdate {
     /// Where its star and its link end in the lists of the batch.
     star_end: usize,
     link_end: usize,
+    levels_end: usize,
 }
 
 /// The stars of consecutive updates, coded.
@@ -111,7 +139,9 @@ impl Coded {
             return Err(damaged(UpdateError::Inverted { update }));
         }
         let fields = star.levels.len();
-        star.put_residuals(places, &mut self.residuals[at * fields..][..fields]);
+        if star.corners.is_empty() {
+            star.put_residuals(places, &mut self.residuals[at * fields..][..fields]);
+        }
         tets.clear();
         tets.extend_from_slice(star.tets);
         let (labels, children) = (star.link.iter().map(|v| v.0), |label| forest.children(label));
@@ -140,6 +170,9 @@ struct TakenStar<'a> {
     link: &'a [(u32, [i32; 3])],
     /// Their levels, vertex by vertex and field by field.
     link_levels: &'a [i32],
+    /// Where fields jump, which of these are those of each removed tetrahedron, and the levels of the vertex in its further regions.
+    corners: &'a [[u16; 4]],
+    sides: &'a [i32],
 }
 
 impl<'a> TakenStar<'a> {
@@ -153,10 +186,11 @@ impl<'a> TakenStar<'a> {
     /// What created each tetrahedron that the update has removed, and the levels at its corners: those of the one that took its slot, with
     /// the near vertex in place of the new one.
     fn removed(&self, mt: &HalfEdgeMt) -> impl Iterator<Item = (Option<UpdateId>, [&'a [i32]; 4])> + Clone {
-        self.tets[..self.removed].iter().map(|new| {
+        (0..).zip(&self.tets[..self.removed]).map(|(i, new): (usize, _)| {
             let corners = new.corners.map(|c| if c == NEW { 0 } else { usize::from(c) });
             let newest = corners.iter().map(|&c| self.link[c].0).max();
-            (newest.and_then(|v| mt.inserted_by(VertexId(v))), corners.map(|c| self.levels_at(c)))
+            let levels = self.corners.get(i).map_or(corners, |corners| corners.map(usize::from));
+            (newest.and_then(|v| mt.inserted_by(VertexId(v))), levels.map(|c| self.levels_at(c)))
         })
     }
 
@@ -175,8 +209,9 @@ impl<'a> TakenStar<'a> {
 
     /// The range of the levels of its vertices, field by field.
     fn ranges(&self) -> impl Iterator<Item = [i32; 2]> {
-        (0..self.levels.len()).map(|f| {
-            let around = (0..self.link.len()).map(|v| self.levels_at(v)[f]);
+        let fields = self.levels.len();
+        (0..fields).map(move |f| {
+            let around = self.link_levels.iter().chain(self.sides).skip(f).step_by(fields).copied();
             around.fold([self.levels[f]; 2], |[low, high], level| [low.min(level), high.max(level)])
         })
     }
@@ -198,20 +233,25 @@ impl Batch {
         self.star.clear();
         self.link.clear();
         self.link_levels.clear();
+        self.sides = Rows::new();
+        self.jumping = Jumping::default();
         self.applied.clear();
     }
 
     /// Adds the next update.
-    pub fn push(&mut self, levels: &[i32], errors: &[ErrorCode], star: impl Iterator<Item = Remover>) {
-        self.levels.extend_from_slice(levels);
-        self.errors.extend_from_slice(errors);
+    pub fn push(&mut self, next: &NextUpdate<'_>, star: impl Iterator<Item = Remover>) {
+        self.levels.extend_from_slice(next.levels);
+        self.errors.extend_from_slice(next.errors);
+        self.faces.extend_from_slice(next.faces);
+        let sides = next.sides.iter().map(|(region, levels)| {
+            let first = self.jumping.given.len() as u32;
+            self.jumping.given.extend_from_slice(levels);
+            Side { region: *region, first }
+        });
+        let sides: Vec<Side> = sides.collect();
+        self.sides.push(&sides);
         self.removers.extend(star);
         self.remover_ends.push(self.removers.len());
-    }
-
-    /// Adds the faces of the star of the last update.
-    pub fn push_faces(&mut self, faces: &[[u32; 3]]) {
-        self.faces.extend_from_slice(faces);
     }
 
     /// What is given of the star of the `i`-th update: what removes it, and the faces if there are any.
@@ -269,17 +309,22 @@ impl Batch {
         scratch.find_star(mesh).ok_or_else(refused)?;
         let offset = forest.offset(update, near).ok_or_else(refused)?;
         let position = [0, 1, 2].map(|k| mesh.positions[slot as usize][k].saturating_add(offset[k]));
-        let levels = self.levels_of(i, mesh.fields);
-        if !mt.info().holds(position, levels) {
+        if mt.has_sides() {
+            self.take_sides(i, mesh, position, scratch);
+        } else {
+            scratch.levels.clear();
+            scratch.levels.extend_from_slice(self.levels_of(i, mesh.fields));
+        }
+        if !scratch.levels.chunks(mesh.fields).all(|levels| mt.info().holds(position, levels)) {
             return Err(damaged(UpdateError::OffLattice { update }));
         }
-        scratch.levels.clear();
-        scratch.levels.extend_from_slice(levels);
         set_removers(scratch, mesh, names, vertex, self.given(i)).ok_or_else(refused)?;
         self.star.extend_from_slice(&scratch.star[..scratch.star_len]);
         for &slot in &scratch.link[..scratch.link_len] {
             self.link.push((mesh.vertex(slot).0, mesh.positions[slot as usize]));
-            self.link_levels.extend_from_slice(mesh.levels(slot));
+            if !mt.has_sides() {
+                self.link_levels.extend_from_slice(mesh.levels(slot));
+            }
         }
         self.applied.push(AppliedUpdate {
             position,
@@ -287,17 +332,61 @@ impl Batch {
             regions: mesh.regions_of(&scratch.slots[..scratch.removed_len]),
             star_end: self.star.len(),
             link_end: self.link.len(),
+            levels_end: self.link_levels.len(),
         });
         mt.perform_insertion(mesh, u, position, scratch);
         mesh.clear_touched();
         Ok(())
     }
 
-    /// Where the star and the link of the `i`-th update are.
-    fn ranges(&self, i: usize) -> [Range<usize>; 2] {
+    /// Where fields jump: sets the levels of the vertex of the `i`-th update in the scratch space, where its star is, and takes down what is
+    /// stored of them, and the levels at the corners of what it removes.
+    fn take_sides(&mut self, i: usize, mesh: &CurrentMesh, position: [i32; 3], scratch: &mut Scratch) {
+        let fields = mesh.fields;
+        scratch.place(mesh, position);
+        let predicted = std::mem::take(&mut scratch.levels);
+        let given = self.sides.row(i);
+        let own = self.levels_of(i, fields);
+        let mut levels = Vec::with_capacity(predicted.len());
+        for &region in &scratch.regions {
+            let side = given.iter().find(|side| side.region == region);
+            levels.extend_from_slice(
+                side.map_or(own, |side| &self.jumping.given[side.first as usize..][..fields]),
+            );
+        }
+        let jumps = mesh.jumps().unwrap_or(&[]);
+        let residual = |(at, (own, predicted)): (usize, (&i32, &i32))| {
+            // What does not jump has the level of the first region in all others.
+            if at < fields || jumps[at % fields] { own - predicted } else { 0 }
+        };
+        let residuals: Vec<i32> = levels.iter().zip(&predicted).enumerate().map(residual).collect();
+        self.jumping.levels.push(&levels[fields..]);
+        self.jumping.residuals.push(&residuals);
+        self.levels[i * fields..][..fields].copy_from_slice(&levels[..fields]);
+        scratch.levels = levels;
+        let mut slots: Vec<u32> = Vec::new();
+        let removed = scratch.slots[..scratch.removed_len].iter().filter_map(|&t| mesh.tet(t));
+        let corners: Vec<[u16; 4]> = removed
+            .map(|tet| {
+                tet.map(|slot| {
+                    let place = slots.iter().position(|&known| known == slot);
+                    place.unwrap_or_else(|| {
+                        slots.push(slot);
+                        self.link_levels.extend_from_slice(mesh.levels(slot));
+                        slots.len() - 1
+                    }) as u16
+                })
+            })
+            .collect();
+        self.jumping.corners.push(&corners);
+    }
+
+    /// Where the star, the link and the levels there of the `i`-th update are.
+    fn ranges(&self, i: usize) -> [Range<usize>; 3] {
         [
             before(i, |i| self.applied[i].star_end)..self.applied[i].star_end,
             before(i, |i| self.applied[i].link_end)..self.applied[i].link_end,
+            before(i, |i| self.applied[i].levels_end)..self.applied[i].levels_end,
         ]
     }
 
@@ -305,8 +394,8 @@ impl Batch {
     pub fn code(&self, mt: &HalfEdgeMt, forest: &Forest, margins: &mut Margins) -> CodedBatch {
         let fields = mt.info().fields.len();
         for i in 0..self.applied.len() {
-            let [_, link] = self.ranges(i);
-            margins.note(link.map(|v| &self.link_levels[v * fields..][..fields]));
+            let [.., levels] = self.ranges(i);
+            margins.note(self.link_levels[levels].chunks(fields));
         }
         let margins = &*margins;
         let code = |range: Range<usize>| self.code_share(range, mt, forest, margins);
@@ -338,7 +427,8 @@ impl Batch {
     fn star_of(&self, i: usize, mt: &HalfEdgeMt) -> TakenStar<'_> {
         let fields = mt.info().fields.len();
         let update = UpdateId(self.first + i as u32);
-        let [star, link] = self.ranges(i);
+        let [star, link, levels] = self.ranges(i);
+        let jumps = mt.has_sides();
         TakenStar {
             update,
             vertex: mt.vertex(update).0,
@@ -346,8 +436,10 @@ impl Batch {
             levels: self.levels_of(i, fields),
             tets: &self.star[star],
             removed: self.applied[i].removed,
-            link: &self.link[link.clone()],
-            link_levels: &self.link_levels[link.start * fields..link.end * fields],
+            link: &self.link[link],
+            link_levels: &self.link_levels[levels],
+            corners: if jumps { self.jumping.corners.row(i) } else { &[] },
+            sides: if jumps { self.jumping.levels.row(i) } else { &[] },
         }
     }
 
@@ -384,9 +476,14 @@ impl Batch {
             for (at, &end) in coded.ends.iter().enumerate() {
                 let i = share * SHARE + at;
                 let u = UpdateId(self.first + i as u32);
+                let (own, sides) = match mt.has_sides() {
+                    true => self.jumping.residuals.row(i).split_at(fields),
+                    false => (&coded.residuals[at * fields..][..fields], &[][..]),
+                };
                 let record = HalfEdgeUpdate {
                     children: forest.children(mt.vertex(u).0),
-                    level_residuals: &coded.residuals[at * fields..][..fields],
+                    level_residuals: own,
+                    side_residuals: sides,
                     star: &coded.stars[before(at, |at| coded.ends[at])..end],
                     errors: self.errors_of(i, fields),
                 };

@@ -26,6 +26,8 @@ const BATCH: usize = 1024;
 pub struct NextUpdate<'a> {
     /// The levels of the new vertex.
     pub levels: &'a [i32],
+    /// Where fields jump, its levels in single regions; in others it has those above.
+    pub sides: &'a [(u16, &'a [i32])],
     pub errors: &'a [ErrorCode],
     /// The faces opposite the new vertex of the tetrahedra that it is to insert, each one and all of them in ascending order of names;
     /// empty if they are those that it does insert.
@@ -99,11 +101,11 @@ impl HalfEdgeBuilder {
         star: impl Iterator<Item = Remover>,
     ) -> Result<(), ConvertError> {
         let fields = self.mt.info().fields.len();
-        if next.levels.len() != fields || next.errors.len() != fields {
+        let fits = |(_, levels): &(u16, &[i32])| levels.len() == fields;
+        if next.levels.len() != fields || next.errors.len() != fields || !next.sides.iter().all(fits) {
             return Err(refused(self.len));
         }
-        self.next.push(next.levels, next.errors, star);
-        self.next.push_faces(next.faces);
+        self.next.push(next, star);
         self.len += 1;
         if self.next.len() < BATCH { Ok(()) } else { self.turn() }
     }

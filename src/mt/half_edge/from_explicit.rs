@@ -40,7 +40,7 @@ impl HalfEdgeMt {
             find_star(explicit, UpdateId(u), &mut star).ok_or(refused(u))?;
             let faces: Vec<[u32; 3]> = star.iter().map(|&(face, _)| face).collect();
             let levels = explicit.levels(VertexId(base + u));
-            let next = NextUpdate { levels, errors: explicit.errors(UpdateId(u)), faces: &faces };
+            let next = NextUpdate { levels, sides: &[], errors: explicit.errors(UpdateId(u)), faces: &faces };
             let remover = |t: u32| (explicit.removed_by(t).map_or(NONE, |u| u.0), inner.bits[t as usize]);
             builder.push(&next, star.iter().map(|&(_, t)| remover(t)))?;
         }

@@ -74,18 +74,25 @@ impl Places {
     /// Predicts the levels of the new vertex from those of the link: means by inverse squared distance, in whole numbers, so that the order
     /// of the link does not matter.
     pub fn predict_levels<'a>(&self, levels_at: impl Fn(usize) -> &'a [i32], levels: &mut [i32]) {
+        for (field, level) in levels.iter_mut().enumerate() {
+            *level = self.predict_level(|v| Some(levels_at(v)[field]));
+        }
+    }
+
+    /// Predicts one of them, from those vertices of the link that have one.
+    #[inline]
+    pub fn predict_level(&self, level_at: impl Fn(usize) -> Option<i32>) -> i32 {
         let squared = &self.squared[..self.link_len];
         let largest = squared.iter().copied().max().unwrap_or(1).max(1);
-        for (field, level) in levels.iter_mut().enumerate() {
-            let (mut total, mut sum) = (0_u128, 0_u128);
-            for (v, &squared) in squared.iter().enumerate() {
-                let weight = weight(largest, squared);
-                total += weight;
-                // Levels are not negative.
-                sum += weight * u128::from(levels_at(v)[field].unsigned_abs());
-            }
-            *level = mean(sum, total.max(1)) as i32;
+        let (mut total, mut sum) = (0_u128, 0_u128);
+        for (v, &squared) in squared.iter().enumerate() {
+            let Some(level) = level_at(v) else { continue };
+            let weight = weight(largest, squared);
+            total += weight;
+            // Levels are not negative.
+            sum += weight * u128::from(level.unsigned_abs());
         }
+        mean(sum, total.max(1)) as i32
     }
 
     /// The sine of the angle at which the end of a way from a corner of a tetrahedron lies over a face at that corner; none if it does not

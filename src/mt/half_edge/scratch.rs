@@ -46,7 +46,10 @@ pub(in crate::mt) struct Scratch {
     /// For each vertex of the link: which gap has a face with it and the edge from the near to the new vertex, and the corner of
     /// the gap opposite this face; once two have, [`JOINED`].
     ends: ByCorner<[u8; 2]>,
+    /// The levels of the new vertex: in its first region, and then, where fields jump, in each further one.
     pub levels: Vec<i32>,
+    /// Where fields jump, the regions of the new vertex, ascending.
+    pub regions: Vec<u16>,
     pub gathered: Star,
     pub places: Places,
     pub hashes: Hashes,
@@ -64,6 +67,7 @@ impl Default for Scratch {
             gaps: ArrayVec::new(),
             ends: [NO_END; _],
             levels: Vec::new(),
+            regions: Vec::new(),
             gathered: Star::default(),
             places: Places::default(),
             hashes: Hashes::default(),
@@ -236,8 +240,55 @@ impl Scratch {
     pub fn place(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
         let link = &self.link[..self.link_len];
         self.places.set(link.iter().map(|&v| mesh.positions[v as usize]), position);
+        if let Some(jumps) = mesh.jumps() {
+            self.regions = mesh.regions_of(&self.slots[..self.removed_len]);
+            return self.predict_sides(mesh, jumps);
+        }
         self.levels.resize(mesh.fields, 0);
         self.places.predict_levels(|v| mesh.levels(link[v]), &mut self.levels);
+    }
+
+    /// Predicts the levels of the new vertex in each of its regions: of a field that jumps, from those vertices around it that are in the
+    /// region, too.
+    fn predict_sides(&mut self, mesh: &CurrentMesh, jumps: &[bool]) {
+        self.levels.clear();
+        for &region in &self.regions {
+            let mut sides = [NONE; MOST];
+            for (new, &t) in self.star[..self.removed_len].iter().zip(&self.slots) {
+                if mesh.region(t) == region {
+                    for corner in new.corners.map(|corner| if corner == NEW { 0 } else { corner }) {
+                        let slot = self.link[usize::from(corner)];
+                        sides[usize::from(corner) % MOST] = mesh.side(slot, region);
+                    }
+                }
+            }
+            for (field, &jumps) in jumps.iter().enumerate() {
+                let level = self.places.predict_level(|v| match jumps {
+                    true => Some(sides[v]).filter(|&side| side != NONE).map(|side| mesh.levels(side)[field]),
+                    false => Some(mesh.levels(self.link[v])[field]),
+                });
+                self.levels.push(level);
+            }
+        }
+    }
+
+    /// Adds what is stored of an update to the levels that are predicted. None if that is not what the vertex needs.
+    pub fn add_residuals(&mut self, mesh: &CurrentMesh, own: &[i32], sides: &[i32]) -> Option<()> {
+        let fields = mesh.fields;
+        if sides.is_empty() {
+            self.levels.truncate(fields);
+        }
+        let residuals = own.iter().chain(sides);
+        (self.levels.len() == own.len() + sides.len()).then_some(())?;
+        self.levels.iter_mut().zip(residuals).for_each(|(level, residual)| {
+            *level = level.saturating_add(*residual);
+        });
+        for i in fields..self.levels.len() {
+            if !mesh.jumps()?[i % fields] {
+                self.levels[i] = self.levels[i % fields];
+            }
+        }
+        Some(())
     }
 }
 

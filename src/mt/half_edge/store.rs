@@ -28,7 +28,7 @@ use crate::mt::error::Result;
 use crate::mt::facts::MtFacts;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::pages::{Page, Pages, Rows};
-use crate::mt::regions::{RegionInfo, Regions, measure};
+use crate::mt::regions::{RegionInfo, Regions, measure, regions_of_vertices};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
     BaseMesh, CurrentMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId,
@@ -60,6 +60,9 @@ pub struct HalfEdgeUpdate<'a> {
     pub children: &'a [ForestChild],
     /// Field by field, what is to be added to the level predicted from Π_u.
     pub level_residuals: &'a [i32],
+    /// Where fields jump and the vertex is in several regions: for each of these but the first, ascending, and field by field, what is to be
+    /// added to the level predicted in that region; nothing if it has the same levels in all of them.
+    pub side_residuals: &'a [i32],
     /// What removes the tetrahedra of the star, coded: see `mt/half_edge/star_code.rs`.
     pub star: &'a [u8],
     /// Field by field, what bounds the error of every tetrahedron that the update removes, and of all updates that depend on
@@ -108,15 +111,18 @@ pub(super) struct HalfEdgePage {
     pub(super) children: Rows<ForestChild>,
     stars: Rows<u8>,
     level_residuals: Vec<i32>,
+    /// None where no field jumps.
+    side_residuals: Option<Rows<i32>>,
     errors: Errors,
 }
 
 impl HalfEdgePage {
-    fn new(fields: usize) -> Self {
+    fn new(fields: usize, has_sides: bool) -> Self {
         Self {
             children: Rows::new(),
             stars: Rows::new(),
             level_residuals: Vec::new(),
+            side_residuals: has_sides.then(Rows::new),
             errors: Errors::new(fields),
         }
     }
@@ -126,6 +132,9 @@ impl HalfEdgePage {
         self.children.push(update.children);
         self.stars.push(update.star);
         self.level_residuals.extend_from_slice(update.level_residuals);
+        if let Some(rows) = &mut self.side_residuals {
+            rows.push(update.side_residuals);
+        }
         let complete = self.errors.push(update.errors);
         assert!(complete, "each field has an error: that is checked");
     }
@@ -137,7 +146,8 @@ impl Page for HalfEdgePage {
     }
 
     fn bytes(&self) -> usize {
-        let levels = size_of_val(&self.level_residuals[..]);
+        let sides = self.side_residuals.as_ref().map_or(0, Rows::bytes);
+        let levels = size_of_val(&self.level_residuals[..]) + sides;
         self.children.bytes() + self.stars.bytes() + levels + self.errors.bytes()
     }
 }
@@ -203,7 +213,25 @@ impl HalfEdgeMt {
         if new.level_residuals.len() != fields.len() || !levels.into_iter().all(fits) {
             return Err(UpdateError::OffLattice { update });
         }
+        let sides = new.side_residuals;
+        let fits_field =
+            |(i, residual): (usize, &i32)| residual.unsigned_abs() < 1 << (fields[i % fields.len()].bits + 1);
+        if !sides.is_empty() && !(self.has_sides() && sides.len().is_multiple_of(fields.len()))
+            || !sides.iter().enumerate().all(fits_field)
+        {
+            return Err(UpdateError::OffLattice { update });
+        }
         if new.errors.len() == fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }
+    }
+
+    /// Whether vertices may have values for several regions.
+    pub fn has_sides(&self) -> bool {
+        self.jumps().is_some()
+    }
+
+    /// For each field whether its values depend on the region; none if those of no field do.
+    pub(crate) fn jumps(&self) -> Option<&[bool]> {
+        self.regions.as_ref().map(|regions| &regions.sides.jumps[..]).filter(|jumps| !jumps.is_empty())
     }
 
     /// Adds the next update, behind all that are here.
@@ -219,8 +247,8 @@ impl HalfEdgeMt {
         self.check(update, new)?;
         self.facts = None;
         self.note_children(self.vertex(UpdateId(update)).0, new.children)?;
-        let fields = self.info.fields.len();
-        self.pages.push(|_| HalfEdgePage::new(fields), |page| page.push(new));
+        let (fields, has_sides) = (self.info.fields.len(), self.has_sides());
+        self.pages.push(|_| HalfEdgePage::new(fields, has_sides), |page| page.push(new));
         Ok(UpdateId(update))
     }
 
@@ -261,14 +289,34 @@ impl HalfEdgeMt {
     /// States the regions of the volume.
     ///
     /// # Errors
-    /// If not every base tetrahedron has one of them.
+    /// If not every base tetrahedron has one of them, base vertices do not have levels in theirs where fields jump, or updates are here that
+    /// were made without.
     pub fn set_regions(&mut self, regions: Regions) -> Result<()> {
         let known = |&region: &u16| usize::from(region) < regions.all.len();
         if regions.of_base.len() != self.base.tets.len() || !regions.of_base.iter().all(known) {
             return Err(UpdateError::Cavity { update: 0 });
         }
+        self.check_sides(&regions)?;
         self.regions = Some(Box::new(regions));
         Ok(())
+    }
+
+    /// Checks the levels of base vertices in their regions.
+    fn check_sides(&self, Regions { sides, of_base, .. }: &Regions) -> Result<()> {
+        let fields = self.info.fields.len();
+        let vertices = self.base.positions.len();
+        let of_vertices = if sides.jumps.is_empty() {
+            Vec::new()
+        } else {
+            regions_of_vertices(vertices, &self.base.tets, of_base)
+        };
+        let rows: usize = of_vertices.iter().map(|own| own.len().saturating_sub(1)).sum();
+        let is_sound = (sides.jumps.is_empty() || sides.jumps.len() == fields)
+            && sides.levels.len() == rows * fields
+            && sides.levels.chunks(fields).all(|levels| self.info.holds([0; 3], levels));
+        // Updates that are here have values in regions if any field jumps.
+        let fits = self.updates() == 0 || self.has_sides() != sides.jumps.is_empty();
+        if is_sound && fits { Ok(()) } else { Err(UpdateError::OffLattice { update: 0 }) }
     }
 
     /// Finds what is said of the regions in the reference mesh, given that. None if one does not have the tetrahedra that are stated.
@@ -296,7 +344,7 @@ impl HalfEdgeMt {
     /// vertices have the same update as a child. The MT is as it was then.
     pub fn insert_page(&mut self, page: u32, updates: &[HalfEdgeUpdate<'_>]) -> Result<(), PageError> {
         let range = self.pages.check_new(page, updates.len())?;
-        let mut new = HalfEdgePage::new(self.info.fields.len());
+        let mut new = HalfEdgePage::new(self.info.fields.len(), self.has_sides());
         for (update, record) in range.clone().zip(updates) {
             self.check(update, record)?;
             new.push(record);
@@ -338,6 +386,7 @@ impl HalfEdgeMt {
         Some(HalfEdgeUpdate {
             children: page.children.row(place),
             level_residuals: &page.level_residuals[place * fields..][..fields],
+            side_residuals: page.side_residuals.as_ref().map_or(&[], |rows| rows.row(place)),
             star: page.stars.row(place),
             errors: page.errors.of(place),
         })

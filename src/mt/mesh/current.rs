@@ -10,6 +10,7 @@
 
 use super::base::{BaseMesh, BaseMeshError};
 use super::paged_array::PagedArray;
+use super::sides::Sides;
 use super::tet::face_neighbors;
 use crate::mesh::{BitSet, ChangedBlocks, FACES, NONE};
 use crate::mt::{MtInfo, VertexId};
@@ -107,6 +108,8 @@ pub struct CurrentMesh {
     pub(super) has_tet_bytes: bool,
     /// The region of each tetrahedron, kept in free slots, too; empty if the MT has no regions.
     pub(in crate::mt) regions: Vec<u16>,
+    /// Where fields jump at interfaces.
+    pub(super) sides: Option<Box<Sides>>,
     /// Whether every vertex that is not of the base mesh has a star whose tetrahedra hang together through faces.
     pub(in crate::mt) whole_stars: bool,
     /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.
@@ -120,8 +123,8 @@ pub struct CurrentMesh {
     pub(in crate::mt) epoch: u32,
     /// What the kind of the MT keeps with its meshes.
     kind_state: Option<Box<dyn KindState>>,
-    changed_vertices: ChangedBlocks,
-    changed_tets: ChangedBlocks,
+    pub(super) changed_vertices: ChangedBlocks,
+    pub(super) changed_tets: ChangedBlocks,
     /// The tetrahedra of the stars that updates changed since the list was last cleared, and where others were moved;
     /// free slots among them.
     pub(in crate::mt) touched: Vec<u32>,
@@ -193,6 +196,7 @@ impl CurrentMesh {
             tet_bytes: Vec::new(),
             has_tet_bytes: false,
             regions: Vec::new(),
+            sides: None,
             whole_stars: false,
             place_of: PagedArray::new(NONE),
             free_vertices: Vec::new(),
@@ -270,7 +274,7 @@ impl CurrentMesh {
         self.tets.len() - self.free_tets.len()
     }
 
-    /// Number of vertices.
+    /// Number of points: a vertex is as many as it has values for regions.
     pub fn vertex_count(&self) -> usize {
         self.labels.len() - self.free_vertices.len()
     }
@@ -292,6 +296,7 @@ impl CurrentMesh {
             + size_of_val(&self.free_tets[..])
             + size_of_val(&self.touched[..]);
         let of_the_mt = self.slot_of.bytes()
+            + self.sides.as_ref().map_or(0, |sides| sides.bytes())
             + self.place_of.bytes()
             + size_of_val(self.proven.words())
             + size_of_val(&self.pinched[..]);
@@ -327,14 +332,21 @@ impl CurrentMesh {
         self.tets.len()
     }
 
-    /// The vertex slots of tetrahedron `t`; none if the slot is free.
+    /// The vertex slots of tetrahedron `t`; none if the slot is free. Where fields jump at interfaces, those with the values in its region.
     #[inline]
     pub fn tet(&self, t: u32) -> Option<[u32; 4]> {
-        self.tets.get(t as usize).copied().filter(|tet| tet[0] != NONE)
+        let tet = self.tets.get(t as usize).copied().filter(|tet| tet[0] != NONE)?;
+        Some(self.with_sides(t, tet))
     }
 
-    /// The tetrahedra as vertex slots; without holes after [`CurrentMesh::compact`].
+    /// The tetrahedra as vertex slots; without holes, and up to date, after [`CurrentMesh::compact`]. Where fields jump at interfaces, a
+    /// vertex there has a slot for each region.
     pub fn tets(&self) -> &[[u32; 4]] {
+        self.sides.as_ref().map_or(&self.tets, |sides| &sides.corners)
+    }
+
+    /// [`CurrentMesh::tets`] with one slot for each vertex: those on both sides of an interface share its vertices.
+    pub fn joined_tets(&self) -> &[[u32; 4]] {
         &self.tets
     }
 
@@ -416,6 +428,7 @@ impl CurrentMesh {
         self.rename_all(&moves);
         self.changed_tets.truncate(self.tets.len());
         self.changed_vertices.truncate(self.labels.len());
+        self.update_corners();
     }
 
     fn fill_tet(&mut self, hole: u32) {
@@ -470,10 +483,14 @@ impl CurrentMesh {
         self.incident[hole as usize] = self.incident[from as usize];
         let fields = self.fields;
         self.levels.copy_within(from as usize * fields..(from as usize + 1) * fields, hole as usize * fields);
-        self.slot_of.set(self.labels[hole as usize].vertex, hole);
         self.changed_vertices.mark(hole);
+        let is_side = self.is_side(hole);
+        if !is_side {
+            self.slot_of.set(self.labels[hole as usize].vertex, hole);
+        }
+        self.move_sides(from, hole);
         self.pop_vertex();
-        Some([from, hole])
+        (!is_side).then_some([from, hole])
     }
 
     fn pop_vertex(&mut self) {
@@ -482,6 +499,7 @@ impl CurrentMesh {
         self.incident.pop();
         self.vertex_marks.pop();
         self.levels.truncate(self.labels.len() * self.fields);
+        self.sides.iter_mut().for_each(|sides| sides.pop());
     }
 
     /// Replaces vertex slots in all tetrahedra.
@@ -584,6 +602,7 @@ impl CurrentMesh {
             self.incident.push(NONE);
             self.vertex_marks.push(0);
             self.levels.resize(self.levels.len() + self.fields, 0);
+            self.sides.iter_mut().for_each(|sides| sides.push());
             self.labels.len() as u32 - 1
         })
     }
@@ -597,6 +616,7 @@ impl CurrentMesh {
     /// Takes the vertex in a slot, which no tetrahedron has any more, out of the mesh.
     pub(crate) fn remove_vertex(&mut self, slot: u32) {
         let vertex = self.labels[slot as usize].vertex;
+        self.remove_sides(slot);
         self.slot_of.set(vertex, NONE);
         self.free_vertex(slot);
     }
@@ -635,6 +655,7 @@ impl CurrentMesh {
     /// Ranges of vertex slots and of tetrahedron slots that changed since the last call, in ascending order.
     /// Entries may have moved only inside these ranges; anything beyond the arrays' ends is gone.
     pub fn take_changes(&mut self) -> MeshChanges {
+        self.update_corners();
         MeshChanges {
             vertices: self.changed_vertices.take(self.labels.len()),
             tets: self.changed_tets.take(self.tets.len()),
@@ -650,7 +671,9 @@ impl CurrentMesh {
             mix(h.iter().fold(0, |s, &x| u64::wrapping_add(s, x)) ^ mix(h[0] ^ h[1] ^ h[2] ^ h[3]))
         };
         let live = (0..).zip(&self.tets).filter(|(_, tet)| tet[0] != NONE);
-        live.fold(0, |sum, (t, tet)| sum.wrapping_add(tet_hash(tet) ^ mix_region(self.region(t))))
+        live.fold(0, |sum, (t, tet)| {
+            sum.wrapping_add(tet_hash(&self.with_sides(t, *tet)) ^ mix_region(self.region(t)))
+        })
     }
 
     fn hash_vertex(&self, slot: usize) -> u64 {
@@ -679,11 +702,15 @@ impl CurrentMesh {
             return Err("two tetrahedra share a face but are not neighbours".into());
         }
         for (slot, labels) in self.labels.iter().enumerate().filter(|(_, l)| l.vertex != NONE) {
+            if self.is_side(slot as u32) {
+                self.check_side(slot as u32)?;
+                continue;
+            }
             if self.slot_of.get(labels.vertex) != slot as u32 {
                 return Err(format!("vertex {} is not in its slot {slot}", labels.vertex));
             }
             let t = self.incident[slot];
-            if self.tet(t).is_none_or(|tet| !tet.contains(&(slot as u32))) {
+            if self.tets.get(t as usize).is_none_or(|tet| !tet.contains(&(slot as u32))) {
                 return Err(format!("tetrahedron {t} does not have the vertex in slot {slot}"));
             }
         }
@@ -703,7 +730,8 @@ impl CurrentMesh {
             if n == NONE {
                 continue;
             }
-            let other = self.tet(n).ok_or_else(|| format!("tetrahedron {t} has a free slot as neighbour"))?;
+            let other = self.tets.get(n as usize).filter(|other| other[0] != NONE);
+            let other = other.ok_or_else(|| format!("tetrahedron {t} has a free slot as neighbour"))?;
             let shared = face.iter().all(|&j| other.contains(&tet[j]));
             let back = self.neighbors[n as usize].iter().filter(|&&m| m as usize == t).count();
             if !shared || back != 1 {

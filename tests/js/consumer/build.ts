@@ -46,6 +46,7 @@ const examples: Examples<BuildOptions> = {
   fields: { fields: ["p"] },
   allFields: { allFields: true },
   cellToPoint: { cellToPoint: false },
+  meanAcrossRegions: { meanAcrossRegions: true },
   preserve: { preserve: ["components"] },
   preserveWithin: { preserveWithin: 0.01 },
   repair: { repair: "none" },

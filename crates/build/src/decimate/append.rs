@@ -1,11 +1,12 @@
 //! Appends the inverses of half-edge collapses, coarse to fine, to a half-edge MT.
 
 use crate::BuildError;
+use crate::lattice::sides::Sides;
 use crate::order::base::Numbered;
 use tetralod::mesh::NONE;
 use tetralod::mt::{
-    BaseMark, ErrorCode, Forest, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate, Regions, VertexId,
-    by_corner,
+    BaseMark, BaseMesh, BaseSides, ErrorCode, Forest, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate,
+    Regions, VertexId, by_corner, regions_of_vertices,
 };
 
 /// Updates in their order. Vertices are numbers of reference points.
@@ -24,6 +25,7 @@ pub(crate) struct Appender<'a> {
     builder: HalfEdgeBuilder,
     /// Point by point and field by field.
     levels: &'a [i32],
+    sides: &'a Sides,
     /// The MT's vertex for each reference point.
     number: Vec<u32>,
 }
@@ -35,7 +37,7 @@ impl<'a> Appender<'a> {
         (info, regions): (MtInfo, Option<Regions>),
         numbered: Numbered,
         updates: &Ordered<'_>,
-        (positions, levels): (&[[i32; 3]], &'a [i32]),
+        (positions, levels, sides): (&[[i32; 3]], &'a [i32], &'a Sides),
         block_bits: u32,
     ) -> Result<Self, BuildError> {
         let Numbered { mesh, mut number, places } = numbered;
@@ -55,6 +57,12 @@ impl<'a> Appender<'a> {
             of_base: places.iter().map(|&place| regions.of_base[place as usize]).collect(),
             ..regions
         });
+        let regions = regions.map(|mut regions| {
+            if !sides.is_empty() {
+                regions.sides = base_sides(&mesh, &regions.of_base, &points, (levels, sides));
+            }
+            regions
+        });
         let near = updates.near.iter().map(|&near| number[near as usize]).collect();
         let offset = |u: u32| {
             let [from, to] = [updates.near, updates.vertices].map(|all| positions[all[u as usize] as usize]);
@@ -62,7 +70,7 @@ impl<'a> Appender<'a> {
         };
         let forest = Forest::new(points.len(), near, offset);
         let builder = HalfEdgeBuilder::new(info, mesh, marks, (forest, points), regions, block_bits)?;
-        Ok(Self { builder, levels, number })
+        Ok(Self { builder, levels, sides, number })
     }
 
     /// Appends the next update. `star` has for each tetrahedron that it inserts, in the order of their faces opposite the new vertex,
@@ -73,12 +81,31 @@ impl<'a> Appender<'a> {
         errors: &[ErrorCode],
         star: impl Iterator<Item = (u32, u8)>,
     ) -> Result<(), BuildError> {
-        let levels = &self.levels[vertex as usize * errors.len()..][..errors.len()];
-        Ok(self.builder.push(&NextUpdate { levels, errors, faces: &[] }, star)?)
+        let levels_of = |point: u32| &self.levels[point as usize * errors.len()..][..errors.len()];
+        let sides: Vec<(u16, &[i32])> =
+            self.sides.further(vertex).map(|(point, region)| (region as u16, levels_of(point))).collect();
+        let next = NextUpdate { levels: levels_of(vertex), sides: &sides, errors, faces: &[] };
+        Ok(self.builder.push(&next, star)?)
     }
 
     /// The MT, and its vertex for each reference point.
     pub fn finish(self) -> Result<(HalfEdgeMt, Vec<VertexId>), BuildError> {
         Ok((self.builder.finish()?, self.number.into_iter().map(VertexId).collect()))
     }
+}
+
+/// The levels of the base vertices, which are these reference points, in each of their regions but the first.
+fn base_sides(
+    mesh: &BaseMesh,
+    of_base: &[u16],
+    points: &[u32],
+    (levels, sides): (&[i32], &Sides),
+) -> BaseSides {
+    let fields = sides.jumps.len();
+    let of_vertices = regions_of_vertices(mesh.positions.len(), &mesh.tets, of_base);
+    let further = points.iter().zip(&of_vertices).flat_map(|(&point, own)| {
+        own.iter().skip(1).map(move |&region| sides.point(point, u32::from(region)))
+    });
+    let rows = further.flat_map(|point| &levels[point as usize * fields..][..fields]);
+    BaseSides { jumps: sides.jumps.clone(), levels: rows.copied().collect() }
 }

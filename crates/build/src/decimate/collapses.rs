@@ -66,7 +66,7 @@ impl Record for Collapses {
     }
 
     fn add(&mut self, removed: &Removed<'_>, quantized: &Quantized) {
-        let Removed { hole, makers, errors, step, .. } = *removed;
+        let Removed { hole, regions, makers, errors, step, .. } = *removed;
         let first = self.makers.len();
         for &i in &hole.sorted {
             let t = hole.star[usize::from(i)].tet as usize;
@@ -74,7 +74,7 @@ impl Record for Collapses {
             self.inner.push(self.inner_now[t]);
         }
         self.starts.push(self.makers.len());
-        self.add_errors(hole, first, (errors, step), quantized);
+        self.add_errors((hole, regions), first, (errors, step), quantized);
         self.boxes.push(match self.earlier {
             0 => bounds(hole, &quantized.positions),
             // What it depends on may have been made elsewhere.
@@ -177,7 +177,7 @@ impl Collapses {
     /// Adds the errors of a collapse whose star is recorded from `first` on.
     fn add_errors(
         &mut self,
-        hole: &Hole,
+        (hole, regions): (&Hole, &[u32]),
         first: usize,
         (errors, step): (&[ErrorCode], f64),
         quantized: &Quantized,
@@ -189,7 +189,7 @@ impl Collapses {
             let of = |&maker: &u32| self.errors[maker as usize * self.fields + f];
             let made = self.makers[first..].iter().filter(|&&maker| maker != NONE);
             let least = made.map(of).max().map_or(own, |largest| {
-                let more = quantized.overshoot(hole.a, &hole.link, f).max(step);
+                let more = quantized.overshoot_of(hole, regions, f).max(step);
                 ErrorCode::at_least(largest.error() + more).coarse()
             });
             self.errors.push(own.max(least));
@@ -335,7 +335,7 @@ impl Collapses {
             .map(|all| order.iter().map(|&c| all[c as usize]).collect::<Vec<u32>>());
         let base_marks: Vec<(u32, u8)> = self.base_marks.iter().copied().map(mark).collect();
         let updates = Ordered { vertices: &vertices, near: &near, base_marks: &base_marks };
-        let reference = (&quantized.positions[..], &quantized.levels[..]);
+        let reference = (&quantized.positions[..], &quantized.levels[..], &quantized.sides);
         let mut appender = Appender::new((info, regions), numbered, &updates, reference, block_bits)?;
         for (u, &c) in order.iter().enumerate() {
             BuildProgress::tell_ordered(u, order.len(), progress)?;

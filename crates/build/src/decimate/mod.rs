@@ -74,6 +74,8 @@ pub(crate) trait Record {
 pub(crate) struct Removed<'a> {
     pub hole: &'a Hole,
     pub filling: &'a Filling,
+    /// Where fields jump, the regions of the tetrahedra of the hole.
+    pub regions: &'a [u32],
     /// The tetrahedra in which the filling is now.
     pub slots: &'a [u32],
     /// The removals that made the tetrahedra of the mesh before, [`NONE`] for those of the reference mesh.
@@ -312,7 +314,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
     /// Carries out the `i`-th of the prepared removals.
     fn remove(&mut self, i: usize) {
         let Self { state, searches, rounds, slots, record, .. } = self;
-        let RemovalSearch { hole, best, best_end, .. } = &mut searches.ahead[i];
+        let RemovalSearch { hole, best, best_end, regions, .. } = &mut searches.ahead[i];
         let (hole, end) = (&*hole, *best_end);
         let State { mesh, removals, degrees, reference, reaches, restrictions, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
@@ -324,6 +326,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         let removed = Removed {
             hole,
             filling: &best.filling,
+            regions,
             slots,
             makers: &removals.makers,
             end,
@@ -336,7 +339,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         record.add(&removed, reference.quantized);
         removals.errors.extend(errors);
         slots.iter().for_each(|&t| removals.makers[t as usize] = removal);
-        let input = Input { hole, filling: &best.filling, reference };
+        let input = Input { hole, filling: &best.filling, reference, regions: &best.regions };
         best.cost.move_points(&mut state.buckets, slots, input);
         let star = hole.faces.iter().flat_map(|(face, _)| face);
         star.for_each(|&v| degrees[v as usize] -= 1);

@@ -5,7 +5,7 @@
 use crate::change::gift_wrap::{Around, GiftWrap, is_new};
 use crate::change::half_edge::{Nearby, contract, keeps_topology, may_contract};
 use crate::change::hole::{Filling, Hole};
-use crate::change::sides::FaceSet;
+use crate::change::sides::{FaceSet, bits};
 use crate::change::work_mesh::WorkMesh;
 use crate::decimate::candidate_queue::{Key, Levels};
 use crate::error::centre::{Centre, Seat};
@@ -83,6 +83,13 @@ impl<'a> State<'a> {
         }
     }
 
+    /// The regions of the tetrahedra of a hole, where fields jump.
+    fn regions_of(&self, hole: &Hole) -> impl Iterator<Item = u32> {
+        let is_needed = !self.reference.quantized.sides.is_empty();
+        let star = hole.star.iter().filter(move |_| is_needed);
+        star.filter_map(|s| self.restrictions.regions().get(s.tet as usize).copied())
+    }
+
     /// How often the star of a vertex has changed; 0 for [`NONE`].
     fn version(&self, v: u32) -> u32 {
         self.versions.get(v as usize).copied().unwrap_or(0)
@@ -105,6 +112,8 @@ pub(crate) struct RemovalSearch {
     /// None where holes are filled by contracting edges.
     gift_wrap: Option<GiftWrap>,
     pub hole: Hole,
+    /// Where fields jump, the regions of its tetrahedra.
+    pub regions: Vec<u32>,
     hole_cost: HoleCost,
     nearby: Nearby,
     around: Around,
@@ -127,6 +136,8 @@ pub(crate) struct RemovalSearch {
 pub(crate) struct Candidate {
     pub filling: Filling,
     pub cost: FillCost,
+    /// Where fields jump, the regions of its cells.
+    pub regions: Vec<u32>,
     /// The largest error, which decides the level.
     error: f64,
 }
@@ -139,7 +150,17 @@ impl Candidate {
         limit: f64,
         contraction: (FaceSet, Option<Seat>),
     ) {
-        let input = Input { hole, filling: &self.filling, reference: &state.reference };
+        self.regions.clear();
+        if !state.reference.quantized.sides.is_empty() {
+            // Those of a contraction are in the order of their faces.
+            self.regions.extend(
+                bits(contraction.0).filter_map(|face| {
+                    state.restrictions.regions().get(hole.star[face].tet as usize).copied()
+                }),
+            );
+        }
+        let input =
+            Input { hole, filling: &self.filling, reference: &state.reference, regions: &self.regions };
         self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input, contraction);
     }
 }
@@ -149,6 +170,7 @@ impl RemovalSearch {
         Self {
             gift_wrap,
             hole: Hole::default(),
+            regions: Vec::new(),
             hole_cost: HoleCost::default(),
             nearby: Nearby::default(),
             around: Around::default(),
@@ -198,7 +220,10 @@ impl RemovalSearch {
             // The tetrahedra around it are not connected through faces: the input overlaps itself.
             return None;
         }
-        state.removals.find_hole_cost(&self.hole, &state.reference, &mut self.hole_cost);
+        self.regions.clear();
+        self.regions.extend(state.regions_of(&self.hole));
+        let hole = (&self.hole, &self.regions[..]);
+        state.removals.find_hole_cost(hole, &state.reference, &mut self.hole_cost);
         let least = state.levels.of(largest(&self.hole_cost.errors));
         if least > level {
             return Some(Key::new(least, 0, 0.0, a, NONE));
@@ -239,7 +264,7 @@ impl RemovalSearch {
     /// Lists the ends to try, those with the least lower bound of their key first: `known` alone unless that is [`NONE`]. Most do not
     /// make positive tetrahedra, and are left out.
     fn list_ends(&mut self, state: &State<'_>, known: u32) {
-        let Self { ends, hole, hole_cost, centre, .. } = self;
+        let Self { ends, hole, hole_cost, centre, regions, .. } = self;
         ends.clear();
         let reference = &state.reference;
         let (a, own) = (hole.a, largest(&hole_cost.errors));
@@ -253,7 +278,8 @@ impl RemovalSearch {
         for i in places.filter(|&i| may_contract(hole, i)) {
             let seat = centre.seat(hole, i);
             // The error at the removed vertex is mostly the largest.
-            let error = seat.map_or(own, |seat| own.max(centre.error_at(seat, hole, i, reference)));
+            let error =
+                seat.map_or(own, |seat| own.max(centre.error_at(seat, (hole, regions), i, reference)));
             let length = squared_length(at, hole.points[i]);
             let least = Key::new(state.levels.of(error), second + hole.left_at(i), length, a, hole.link[i]);
             ends.push(End { least, place: i, seat });

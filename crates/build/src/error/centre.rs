@@ -93,10 +93,18 @@ impl Centre {
         best
     }
 
-    /// The largest error of all fields there.
-    pub fn error_at(&mut self, seat: Seat, hole: &Hole, i: usize, reference: &Reference<'_>) -> f64 {
+    /// The largest error of all fields there; the tetrahedra of the hole are in these regions if fields jump.
+    pub fn error_at(
+        &mut self,
+        seat: Seat,
+        (hole, regions): (&Hole, &[u32]),
+        i: usize,
+        reference: &Reference<'_>,
+    ) -> f64 {
         let ([x, y, z], b) = (hole.faces[seat.face].0, hole.link[i]);
-        let levels = |f: usize| [x, y, z, b].map(|v| reference.quantized.level(v, f));
-        reference.quantized.deviation(hole.a, clamped(seat.lambda), levels, &mut self.errors)
+        let (quantized, region) = (reference.quantized, regions.get(seat.face).copied());
+        let levels = |f: usize| quantized.levels_of([x, y, z, b], region, f);
+        let point = region.map_or(hole.a, |region| quantized.sides.point(hole.a, region));
+        quantized.deviation(point, clamped(seat.lambda), levels, &mut self.errors)
     }
 }

@@ -47,6 +47,8 @@ pub(crate) struct Input<'a> {
     pub hole: &'a Hole,
     pub filling: &'a Filling,
     pub reference: &'a Reference<'a>,
+    /// Where fields jump, the region of each cell of the filling.
+    pub regions: &'a [u32],
 }
 
 impl Replacement for Input<'_> {
@@ -67,7 +69,11 @@ impl Replacement for Input<'_> {
     }
 
     fn levels(&self, cell: usize, field: usize) -> [i32; 4] {
-        self.filling.tets[cell].map(|v| self.reference.quantized.level(v, field))
+        self.reference.quantized.levels_of(self.filling.tets[cell], self.region(cell), field)
+    }
+
+    fn region(&self, cell: usize) -> Option<u32> {
+        self.regions.get(cell).copied()
     }
 
     fn relative(&self, q: DVec3, origin: DVec3) -> DVec3 {
@@ -91,8 +97,13 @@ impl Removals {
         Self { makers: vec![NONE; tets], ..Self::default() }
     }
 
-    /// What the hole's tetrahedra leave to the removal of its vertex.
-    pub fn find_hole_cost(&self, hole: &Hole, reference: &Reference<'_>, cost: &mut HoleCost) {
+    /// What the hole's tetrahedra, which are in these regions if fields jump, leave to the removal of its vertex.
+    pub fn find_hole_cost(
+        &self,
+        (hole, regions): (&Hole, &[u32]),
+        reference: &Reference<'_>,
+        cost: &mut HoleCost,
+    ) {
         let fields = reference.quantized.fields.len();
         let HoleCost { inherited, depends, errors, makers, is_gathered, .. } = cost;
         *is_gathered = false;
@@ -108,7 +119,7 @@ impl Removals {
         }
         errors.clone_from(inherited);
         if *depends {
-            let overshoot = |f: usize| reference.quantized.overshoot(hole.a, &hole.link, f);
+            let overshoot = |f: usize| reference.quantized.overshoot_of(hole, regions, f);
             errors.iter_mut().enumerate().for_each(|(f, error)| *error += overshoot(f));
         }
     }
@@ -140,7 +151,7 @@ impl FillCost {
         input: Input<'_>,
         (cells, seat): (FaceSet, Option<Seat>),
     ) -> f64 {
-        let Input { hole, filling, reference } = input;
+        let Input { hole, filling, reference, .. } = input;
         let seat = seat.map(|Seat { face, lambda }| (rank(cells, face), lambda));
         let positions = &reference.quantized.positions;
         self.step = 0.0;
@@ -194,6 +205,11 @@ impl FillCost {
     /// bucket.
     fn compare_centre(&mut self, input: Input<'_>, seat: Option<(usize, DVec3)>) {
         let (a, quantized) = (input.hole.a, input.reference.quantized);
+        if quantized.sides.has_several(a) {
+            let further = quantized.sides.further(a).map(|(point, _)| point);
+            std::iter::once(a).chain(further).for_each(|point| _ = self.placement.place(point, 0, &input));
+            return;
+        }
         if let Some((cell, lambda)) = seat {
             if !quantized.is_moved(a) {
                 self.placement.moved_to(a, cell);
@@ -222,7 +238,7 @@ impl FillCost {
 
     /// How far the old boundary is from the new one.
     fn step_of_boundary(&mut self, input: Input<'_>) -> f64 {
-        let Input { hole, filling, reference } = input;
+        let Input { hole, filling, reference, .. } = input;
         let centre = reference.position(hole.a);
         let mut largest = self.placement.nearest(centre, filling.moved, &input).2;
         // Between the vertex and the link the new boundary may be further away than at either. Each edge is the first one

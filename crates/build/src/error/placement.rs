@@ -16,6 +16,10 @@ pub(crate) trait Replacement {
     fn corners(&self, cell: usize) -> [DVec3; 4];
     /// The levels of a field at the corners of a cell.
     fn levels(&self, cell: usize, field: usize) -> [i32; 4];
+    /// The region of a cell, if fields jump between regions.
+    fn region(&self, _cell: usize) -> Option<u32> {
+        None
+    }
     /// A position in model units, relative to the origin of a cell, in steps of the lattice.
     fn relative(&self, q: DVec3, origin: DVec3) -> DVec3;
 }
@@ -137,8 +141,31 @@ impl Placement {
             displaced = reference.error_at(point, distance - moved);
             self.raise(displaced);
         }
+        let region = reference.quantized.region(point);
+        if region.is_some() && new.region(cell) != region {
+            (cell, lambda) = self.locate_in(point, region, new).unwrap_or((cell, lambda));
+        }
         self.moves.push((point, if outside { !(cell as i32) } else { cell as i32 }));
         (self.compare(point, cell, lambda, new).max(displaced), cell)
+    }
+
+    /// The cell of a point's region that contains it, or is least outside of.
+    fn locate_in(
+        &mut self,
+        point: u32,
+        region: Option<u32>,
+        new: &impl Replacement,
+    ) -> Option<(usize, DVec3)> {
+        let place = new.reference().quantized.places.at(point);
+        let cells: Vec<usize> = (0..self.made.len()).filter(|&cell| new.region(cell) == region).collect();
+        let mut best: Option<(usize, DVec3, f64)> = None;
+        for cell in cells {
+            let found = self.try_cell(cell, place, new);
+            if best.is_none_or(|best| found.2 > best.2) {
+                best = Some(found);
+            }
+        }
+        best.map(|(cell, lambda, _)| (cell, lambda))
     }
 
     /// Notes the cell that contains a point.
@@ -152,7 +179,8 @@ impl Placement {
         let mut error = 0.0_f64;
         for point in points {
             let (cell, lambda, depth) = self.locate(new.reference().quantized.places.at(point), 0, new);
-            if depth >= -SLACK {
+            let region = new.reference().quantized.region(point);
+            if depth >= -SLACK && (region.is_none() || region == new.region(cell)) {
                 self.foreign.push((point, cell as u32));
                 error = error.max(self.compare(point, cell, lambda, new));
             }

@@ -21,7 +21,7 @@ pub(crate) struct Buckets {
 impl Buckets {
     /// Of a mesh with so many tetrahedra.
     pub fn new(tets: usize, quantized: &Quantized) -> Self {
-        let points = quantized.positions.len();
+        let points = quantized.places.len();
         let mut inside = Lists::new(tets, points);
         let mut outside_points = OutsidePoints::new(quantized.places.clone());
         for location in &quantized.locations {
@@ -90,7 +90,8 @@ impl<'a> Reference<'a> {
 
     /// What a displacement at a reference vertex counts as.
     pub fn error_at(&self, point: u32, distance: f64) -> f64 {
-        if distance > 0.0 { distance / self.allowances[point as usize] } else { 0.0 }
+        let vertex = self.quantized.vertex(point);
+        if distance > 0.0 { distance / self.allowances[vertex as usize] } else { 0.0 }
     }
 
     /// What a displacement from a triangle of the reference boundary counts as.
@@ -137,7 +138,7 @@ impl<'a> Reference<'a> {
 
     /// Where the lattice has put a reference vertex, in model units from the lattice's origin.
     pub fn position(&self, point: u32) -> DVec3 {
-        self.scaled(self.quantized.positions[point as usize])
+        self.scaled(self.quantized.positions[self.quantized.vertex(point) as usize])
     }
 
     /// A lattice point in model units, from the lattice's origin.

@@ -217,7 +217,7 @@ impl Sequence {
         let step = |at: usize| {
             let Insertion { vertex, inserted, step, .. } = &self.steps[at / fields];
             let around = self.tets[inserted.clone()].iter().flatten().filter(|&v| v != vertex);
-            quantized.overshoot(*vertex, around, at % fields).max(*step)
+            quantized.overshoot(&[*vertex], around, at % fields).max(*step)
         };
         let more: Vec<f64> = (0..errors.len()).map(step).collect();
         for i in (0..self.steps.len()).rev() {

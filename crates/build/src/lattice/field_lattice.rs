@@ -31,19 +31,19 @@ pub(crate) fn field_lattices(fields: &[&Field], config: &BuildConfig) -> Result<
     Ok(infos)
 }
 
-/// Notes the extremes of each field, whose points are at these places.
+/// Notes the extremes of each field, whose points are at these places, those in further regions last.
 pub(crate) fn set_extremes<I: Iterator<Item = [f64; 3]>>(
     infos: &mut [FieldInfo],
     fields: &[&Field],
     places: impl Fn() -> I,
 ) {
     for (info, field) in infos.iter_mut().zip(fields) {
-        info.extremes = Extremes::of(field.values.iter().copied().zip(places()));
+        info.extremes = Extremes::of(field.all_values().copied().zip(places()));
     }
 }
 
 fn shared_lattice(steps: &[&Field], config: &BuildConfig) -> Result<FieldInfo, BuildError> {
-    let values = steps.iter().flat_map(|field| &field.values);
+    let values = steps.iter().flat_map(|field| field.all_values());
     let (min, max) =
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
     let field = steps[0];
@@ -77,7 +77,7 @@ fn shared_lattice(steps: &[&Field], config: &BuildConfig) -> Result<FieldInfo, B
         return Err(BuildError::Option { name: "field-tolerance", expected: "a number of at least 0" });
     }
     let keeps = |info: &FieldInfo| {
-        steps.iter().flat_map(|field| &field.values).all(|&value| loss(info, value) <= tolerance)
+        steps.iter().flat_map(|field| field.all_values()).all(|&value| loss(info, value) <= tolerance)
     };
     (1..=MAX_FIELD_BITS).map(lattice).find(keeps).ok_or_else(|| {
         let finest = lattice(MAX_FIELD_BITS);
@@ -89,7 +89,7 @@ fn shared_lattice(steps: &[&Field], config: &BuildConfig) -> Result<FieldInfo, B
 /// A lattice of step 1 that holds every value of a field of integers, if there is one.
 fn integer_lattice(steps: &[&Field], min: f64, max: f64) -> Option<FieldInfo> {
     let bits = (1..=MAX_FIELD_BITS).find(|&bits| max - min < f64::from(1_u32 << bits))?;
-    let all = steps.iter().all(|field| field.integer && field.values.iter().all(is_exact_integer));
+    let all = steps.iter().all(|field| field.integer && field.all_values().all(is_exact_integer));
     let name = steps[0].name.clone();
     all.then(|| FieldInfo { name, min, max, origin: min, step: 1.0, bits, ..FieldInfo::default() })
 }
@@ -112,5 +112,5 @@ pub(crate) fn loss(info: &FieldInfo, value: f64) -> f64 {
 }
 
 fn largest_loss(info: &FieldInfo, field: &Field) -> f64 {
-    field.values.iter().map(|&value| loss(info, value)).fold(0.0, f64::max)
+    field.all_values().map(|&value| loss(info, value)).fold(0.0, f64::max)
 }

@@ -1,5 +1,6 @@
 //! Which fields of a mesh are kept, and which of them bit for bit.
 
+use crate::lattice::sides;
 use crate::{BuildConfig, BuildError};
 use std::collections::{HashMap, HashSet};
 use tetralod::mesh::{Field, TetMesh, default_field};
@@ -39,6 +40,7 @@ pub(crate) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<
         let at_cells = at_cells.map(|field| mesh.cell_fields[field].name.clone());
         return Err(at_cells.map_or(BuildError::NoField, |name| BuildError::CellField { name }));
     }
+    sides::check(&chosen, config)?;
     if chosen.len() > MAX_FIELDS {
         return Err(BuildError::TooManyFields { fields: chosen.len() });
     }

@@ -6,3 +6,4 @@ pub(crate) mod location;
 pub(crate) mod places;
 pub(crate) mod position_lattice;
 pub(crate) mod quantize;
+pub(crate) mod sides;

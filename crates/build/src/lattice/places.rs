@@ -9,6 +9,8 @@ use std::sync::Arc;
 pub(crate) struct Places {
     rounded: Arc<[[i32; 3]]>,
     exact: Option<Arc<[DVec3]>>,
+    /// The vertices of further points, which are behind all vertices.
+    sides: Arc<[u32]>,
 }
 
 impl Places {
@@ -16,17 +18,30 @@ impl Places {
     pub fn new(rounded: Arc<[[i32; 3]]>, exact: impl Iterator<Item = DVec3> + Clone) -> Self {
         let any_moved = exact.clone().zip(&*rounded).any(|(place, &q)| place != as_vec(q));
         let exact = any_moved.then(|| exact.collect());
-        Self { rounded, exact }
+        Self { rounded, exact, sides: [].into() }
+    }
+
+    /// With further points, at the places of these.
+    pub fn with_sides(self, sides: impl Iterator<Item = u32>) -> Self {
+        Self { sides: sides.collect(), ..self }
+    }
+
+    /// The vertex that a point is one of.
+    #[inline]
+    pub fn vertex(&self, point: u32) -> u32 {
+        let side = (point as usize).checked_sub(self.rounded.len());
+        side.map_or(point, |side| self.sides[side])
     }
 
     /// How many points there are.
     pub fn len(&self) -> usize {
-        self.rounded.len()
+        self.rounded.len() + self.sides.len()
     }
 
     /// Where a point is.
     #[inline]
     pub fn at(&self, point: u32) -> DVec3 {
+        let point = self.vertex(point);
         self.exact
             .as_ref()
             .map_or_else(|| as_vec(self.rounded[point as usize]), |exact| exact[point as usize])

@@ -1,5 +1,6 @@
 //! The input on integer lattices: positions and field levels.
 
+use crate::change::hole::Hole;
 use crate::error::points::{as_vec, clamped};
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
@@ -8,6 +9,8 @@ use crate::lattice::location::Location;
 use crate::lattice::places::Places;
 use crate::lattice::position_lattice;
 use crate::lattice::position_lattice::Placed;
+use crate::lattice::sides::{self, Sides};
+use crate::restrict::preserve;
 use crate::{BuildConfig, BuildError};
 use glam::DVec3;
 use std::sync::Arc;
@@ -20,10 +23,12 @@ pub(crate) struct Quantized {
     pub lattice: Lattice,
     pub fields: Vec<FieldInfo>,
     pub positions: Arc<[[i32; 3]]>,
-    /// `levels[point * fields + f]`.
+    /// `levels[point * fields + f]`; those of sides behind those of vertices.
     pub levels: Vec<i32>,
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
+    /// Where fields jump at interfaces.
+    pub sides: Sides,
     /// The input's points in steps of the lattice, not rounded; the field is compared there.
     pub places: Places,
     /// The locations of the points that the lattice has moved; empty without cells.
@@ -37,19 +42,22 @@ impl Quantized {
         mesh: &TetMesh,
         Placed { lattice, positions }: Placed,
         fields: Vec<FieldInfo>,
-        levels: Vec<i32>,
-        exact: Vec<f64>,
+        (levels, exact): (Vec<i32>, Vec<f64>),
+        sides: Sides,
     ) -> Self {
         let (origin, step) = (DVec3::from(lattice.origin), DVec3::from(lattice.step));
-        let place = |(p, &q): (&[f64; 3], &[i32; 3])| {
+        let place = |(v, (p, &q)): (u32, (&[f64; 3], &[i32; 3]))| {
             let (place, rounded) = ((DVec3::from(*p) - origin) / step, as_vec(q));
-            if place.distance(rounded) < ON_LATTICE { rounded } else { place }
+            // Beside where the lattice has put a vertex of an interface there may be another region.
+            if place.distance(rounded) < ON_LATTICE || sides.has_several(v) { rounded } else { place }
         };
         let rounded = Arc::<[[i32; 3]]>::from(&positions[..]);
-        let places = Places::new(rounded.clone(), mesh.positions.iter().zip(&positions).map(place));
+        let places =
+            Places::new(rounded.clone(), (0..).zip(mesh.positions.iter().zip(&positions)).map(place));
+        let places = places.with_sides(sides.vertices());
         let quantization = position_lattice::largest_move(mesh, &lattice, &positions);
         let positions = rounded;
-        Self { lattice, fields, positions, levels, exact, places, locations: Vec::new(), quantization }
+        Self { lattice, fields, positions, levels, exact, sides, places, locations: Vec::new(), quantization }
     }
 
     /// What is known of the MT of a mesh of so many tetrahedra; not how many updates it has. `displacement_per_error`: model units of
@@ -107,7 +115,7 @@ impl Quantized {
             self.deviation(
                 locate.point,
                 clamped(locate.lambda),
-                |f| tet.map(|v| self.level(v, f)),
+                |f| self.levels_of(tet, self.region(locate.point), f),
                 &mut losses,
             );
         }
@@ -119,14 +127,42 @@ impl Quantized {
         self.levels[v as usize * self.fields.len() + f]
     }
 
-    /// How far the value of field `f` at `v` exceeds the range of those at the points around it, as a fraction of the
+    /// The levels of field `f` at the corners of a tetrahedron that is in a region, if it is known.
+    pub fn levels_of(&self, tet: [u32; 4], region: Option<u32>, f: usize) -> [i32; 4] {
+        tet.map(|v| self.level(region.map_or(v, |region| self.sides.point(v, region)), f))
+    }
+
+    /// The region of a point, where fields jump.
+    #[inline]
+    pub fn region(&self, point: u32) -> Option<u32> {
+        (!self.sides.is_empty()).then(|| self.sides.region(point))
+    }
+
+    /// The vertex that a point is one of.
+    pub fn vertex(&self, point: u32) -> u32 {
+        self.places.vertex(point)
+    }
+
+    /// [`Quantized::overshoot`] for the vertex of a hole whose tetrahedra are in these regions, if fields jump.
+    pub fn overshoot_of(&self, hole: &Hole, regions: &[u32], f: usize) -> f64 {
+        if self.sides.is_empty() {
+            return self.overshoot(&[hole.a], &hole.link, f);
+        }
+        let at = |v: u32, i: usize| self.sides.point(v, regions[i]);
+        let own: Vec<u32> = (0..regions.len()).map(|i| at(hole.a, i)).collect();
+        let around: Vec<u32> =
+            hole.faces.iter().enumerate().flat_map(|(i, (face, _))| face.map(|v| at(v, i))).collect();
+        self.overshoot(&own, &around, f)
+    }
+
+    /// How far the value of field `f` at a vertex, given its points, exceeds the range of those at the points around it, as a fraction of the
     /// field's range. Added to inherited errors it makes the selection by isovalue monotone.
-    pub fn overshoot<'a>(&self, v: u32, around: impl IntoIterator<Item = &'a u32>, f: usize) -> f64 {
+    pub fn overshoot<'a>(&self, own: &[u32], around: impl IntoIterator<Item = &'a u32>, f: usize) -> f64 {
         let field = &self.fields[f];
         let levels = around.into_iter().map(|&w| self.level(w, f));
         let (low, high) = levels.fold((i32::MAX, i32::MIN), |(low, high), x| (low.min(x), high.max(x)));
-        let own = self.level(v, f);
-        let beyond = (own - high).max(low - own).max(0);
+        let beyond = own.iter().map(|&v| self.level(v, f)).map(|own| (own - high).max(low - own));
+        let beyond = beyond.fold(0, i32::max);
         f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9)
     }
 
@@ -188,8 +224,13 @@ pub(crate) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     let placed = position_lattice::place(mesh, config)?;
     position_lattice::check_scale(&placed.lattice)?;
     let mut fields = field_lattice::field_lattices(&chosen, config)?;
-    field_lattice::set_extremes(&mut fields, &chosen, || mesh.positions.iter().copied());
-    Ok(on_lattices(mesh, placed, &chosen, fields))
+    let sides = || mesh.sides.iter().map(|side| mesh.positions[side.point as usize]);
+    field_lattice::set_extremes(&mut fields, &chosen, || mesh.positions.iter().copied().chain(sides()));
+    let sides = match chosen.iter().any(|field| sides::jumps(field)) {
+        true => Sides::of(mesh, &chosen, &preserve::numbers(config, mesh)?.0),
+        false => Sides::default(),
+    };
+    Ok(on_lattices(mesh, placed, &chosen, fields, sides))
 }
 
 /// A mesh on a lattice with these fields on theirs.
@@ -198,12 +239,19 @@ pub(crate) fn on_lattices(
     placed: Placed,
     chosen: &[&Field],
     fields: Vec<FieldInfo>,
+    sides: Sides,
 ) -> Quantized {
-    let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (field.values[i], info));
-    let points = 0..mesh.positions.len();
+    let vertices = mesh.positions.len();
+    let value = |field: &Field, i: usize| match i.checked_sub(vertices) {
+        None => field.values[i],
+        Some(side) if sides::jumps(field) => field.sides[side],
+        Some(side) => field.values[mesh.sides[side].point as usize],
+    };
+    let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (value(field, i), info));
+    let points = 0..vertices + sides.len();
     let levels = points.clone().flat_map(|i| per_point(i).map(|(value, info)| info.nearest(value))).collect();
     let exact = points.flat_map(|i| per_point(i).map(|(x, info)| (x - info.origin) / info.step)).collect();
-    Quantized::new(mesh, placed, fields, levels, exact)
+    Quantized::new(mesh, placed, fields, (levels, exact), sides)
 }
 
 /// The lattices, without points.
@@ -216,6 +264,7 @@ pub(crate) fn lattices_alone(lattice: Lattice, fields: Vec<FieldInfo>, quantizat
         positions,
         levels: Vec::new(),
         exact: Vec::new(),
+        sides: Sides::default(),
         locations: Vec::new(),
         quantization,
     }
@@ -236,8 +285,8 @@ pub(crate) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
         let finer = BuildConfig { position_bits: Some(bits), ..config.clone() };
         let Ok(placed) = position_lattice::place(mesh, &finer) else { break };
         position_lattice::check_scale(&placed.lattice)?;
-        let Quantized { fields, levels, exact, .. } = quantized;
-        quantized = Quantized::new(mesh, placed, fields, levels, exact);
+        let Quantized { fields, levels, exact, sides, .. } = quantized;
+        quantized = Quantized::new(mesh, placed, fields, (levels, exact), sides);
         quantized.locations = location::locations(&mesh.tets, &quantized.positions, &quantized.places)?;
         losses = quantized.losses(&mesh.tets);
     }
@@ -269,6 +318,9 @@ fn check_finite(mesh: &TetMesh, fields: &[&Field]) -> Result<(), BuildError> {
         mesh.positions[i].iter().all(|x| x.is_finite())
             && fields.iter().all(|field| field.values.get(i).is_some_and(|x| x.is_finite()))
     };
+    if let Some(side) = fields.iter().find_map(|field| field.sides.iter().position(|x| !x.is_finite())) {
+        return Err(BuildError::NotFinite { point: mesh.sides[side].point });
+    }
     match (0..mesh.positions.len()).find(|&i| !sound(i)) {
         Some(point) => Err(BuildError::NotFinite { point: point as u32 }),
         None => Ok(()),

@@ -7,6 +7,7 @@ use super::PartsError;
 use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::decimate::append::{Appender, Ordered};
+use crate::lattice::sides::Sides;
 use crate::order::base::{Numbered, number_base};
 use crate::{BuildProgress, BuildResult, BuildSummary, OnProgress};
 use std::collections::BTreeMap;
@@ -49,7 +50,8 @@ pub fn assemble(
         base_marks.push((remover, inner));
     }
     let ordered = Ordered { vertices: &listed.vertices, near: &listed.near, base_marks: &base_marks };
-    let reference = (&piece.positions[..], &levels[..]);
+    let sides = Sides::default();
+    let reference = (&piece.positions[..], &levels[..], &sides);
     let unknown = PartsError::Damaged { what: "its tetrahedra are of other regions" };
     let regions = plan.regions.as_ref().map(|regions| regions.of_base(&piece.regions).ok_or(unknown));
     let described = (info.clone(), regions.transpose()?);

@@ -16,6 +16,7 @@ use crate::error::points::as_vec;
 use crate::error::reference::{Buckets, Reference};
 use crate::lattice::places::Places;
 use crate::lattice::quantize::Quantized;
+use crate::lattice::sides::Sides;
 use crate::order::reach::{self, Reach};
 use crate::restrict::restrictions::Restrictions;
 use crate::{BuildError, BuildProgress, OnProgress};
@@ -122,6 +123,7 @@ fn quantized(info: &MtInfo, piece: &Piece) -> Quantized {
         exact: per_value().map(|(&value, field)| (value - field.origin) / field.step).collect(),
         places: Places::new(positions.clone(), (0..positions.len()).map(place)),
         positions,
+        sides: Sides::default(),
         locations: Vec::new(),
         quantization: info.quantization,
     }

@@ -10,6 +10,7 @@ use super::piece::{Part, Piece};
 use super::plan::{Plan, PlanRegions, purpose};
 use crate::lattice::field_selection;
 use crate::lattice::quantize::{self, Quantized};
+use crate::lattice::sides::jumps;
 use crate::restrict::restrictions::Restrictions;
 use crate::{BuildConfig, BuildCriterion, BuildError};
 use std::collections::BTreeMap;
@@ -53,6 +54,13 @@ pub fn part(
         return part(&whole, config, parts, metadata, put);
     }
     tetralod::mesh::check_arrays(mesh).map_err(BuildError::from)?;
+    // Pieces have one value for each point.
+    if let Some(field) = field_selection::fields(mesh, config)?.iter().find(|field| jumps(field)) {
+        let values = format!("values of field '{}' for each region", field.name);
+        let instead = "average fields across regions (mean_across_regions), or build the mesh as a whole";
+        let which = [values, "building in parts".to_owned()];
+        return Err(BuildError::Combination { which, instead }.into());
+    }
     let quantized = quantize::quantize_cells(mesh, config)?;
     let restrictions = Restrictions::of(config, mesh, &quantized, BuildCriterion::HalfEdge)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();

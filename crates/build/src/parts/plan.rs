@@ -168,7 +168,7 @@ impl PlanRegions {
         let of_base = left.iter().map(number).collect::<Option<_>>()?;
         // Parts keep interfaces as they are.
         let (arrays, all, deviation) = (self.arrays.clone(), self.all.iter().map(region).collect(), 0.0);
-        Some(Regions { arrays, all, of_base, deviation })
+        Some(Regions { arrays, all, of_base, deviation, ..Regions::default() })
     }
 }
 

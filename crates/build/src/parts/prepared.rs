@@ -6,6 +6,7 @@ use crate::BuildError;
 use crate::lattice::location::{self, Location};
 use crate::lattice::position_lattice::Placed;
 use crate::lattice::quantize::{self, Quantized};
+use crate::lattice::sides::Sides;
 use serde::{Deserialize, Serialize};
 use tetralod::geom::Lattice;
 use tetralod::mesh::{Field, TetMesh};
@@ -72,7 +73,7 @@ impl Whole {
         let positions = mesh.positions.iter().map(|&p| self.lattice.nearest(p)).collect();
         let placed = Placed { lattice: self.lattice, positions };
         let chosen: Vec<&Field> = mesh.fields.iter().collect();
-        quantize::on_lattices(mesh, placed, &chosen, self.fields.clone())
+        quantize::on_lattices(mesh, placed, &chosen, self.fields.clone(), Sides::default())
     }
 
     /// The chosen fields.

@@ -76,26 +76,8 @@ impl Regions {
         quantized: &Quantized,
     ) -> Result<Option<Self>, BuildError> {
         let tolerance = tolerance(config)?;
-        // Files of other kinds have no regions.
-        let has_table = config.construction.kind() == MtKind::HalfEdge;
-        let mut of = vec![0_u32; mesh.tets.len()];
-        // The labels of each region.
-        let mut all = vec![Vec::new()];
-        for name in &config.preserve {
-            let mut numbers: BTreeMap<(u32, i64), u32> = BTreeMap::new();
-            let label = labels(mesh, name)?;
-            of.iter().zip(&label).for_each(|(&region, &label)| _ = numbers.insert((region, label), 0));
-            // In ascending order.
-            (0..).zip(numbers.values_mut()).for_each(|(next, number)| *number = next);
-            of.iter_mut().zip(label).for_each(|(region, label)| *region = numbers[&(*region, label)]);
-            if has_table {
-                if numbers.len() > MAX_REGIONS {
-                    return Err(BuildError::Regions { count: numbers.len(), most: MAX_REGIONS });
-                }
-                let keys = numbers.keys();
-                all = keys.map(|(region, label)| [&all[*region as usize][..], &[*label]].concat()).collect();
-            }
-        }
+        let (of, all) = numbers(config, mesh)?;
+        let has_table = has_table(config);
         let interface = tolerance.map(|tolerance| Interface::new(tolerance, &mesh.tets, &of, quantized));
         let table =
             if has_table { table(&config.preserve, all, &of, &mesh.input) } else { mt::Regions::default() };
@@ -167,6 +149,33 @@ impl Regions {
         let regions: Vec<u32> = left.map(|(_, star)| self.of[star.tet as usize]).collect();
         slots.iter().zip(regions).for_each(|(&slot, region)| self.of[slot as usize] = region);
     }
+}
+
+/// Whether a file says what its regions are: those of other kinds have none.
+fn has_table(config: &BuildConfig) -> bool {
+    config.construction.kind() == MtKind::HalfEdge
+}
+
+/// The region of each tetrahedron by the labels of a configuration, and the labels of each region if files say what they are.
+pub(crate) fn numbers(config: &BuildConfig, mesh: &TetMesh) -> Result<(Vec<u32>, Vec<Vec<i64>>), BuildError> {
+    let mut of = vec![0_u32; mesh.tets.len()];
+    let mut all = vec![Vec::new()];
+    for name in &config.preserve {
+        let mut numbers: BTreeMap<(u32, i64), u32> = BTreeMap::new();
+        let label = labels(mesh, name)?;
+        of.iter().zip(&label).for_each(|(&region, &label)| _ = numbers.insert((region, label), 0));
+        // In ascending order.
+        (0..).zip(numbers.values_mut()).for_each(|(next, number)| *number = next);
+        of.iter_mut().zip(label).for_each(|(region, label)| *region = numbers[&(*region, label)]);
+        if has_table(config) {
+            if numbers.len() > MAX_REGIONS {
+                return Err(BuildError::Regions { count: numbers.len(), most: MAX_REGIONS });
+            }
+            let keys = numbers.keys();
+            all = keys.map(|(region, label)| [&all[*region as usize][..], &[*label]].concat()).collect();
+        }
+    }
+    Ok((of, all))
 }
 
 /// The regions of these labels in these arrays, with the names that the input has for them, and how many tetrahedra each has.

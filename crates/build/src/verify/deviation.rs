@@ -4,20 +4,29 @@ use super::expected::{hash_of_tet, hashes_of_vertices};
 use super::mesh_checks::{PlainMesh, PlainReference};
 use super::parts::{Ask, change, is_aside};
 use super::report::{Failures, Measured};
+use super::split::{Split, split};
 use super::surfaces::{Comparison, Distances, Surface};
 use foldhash::HashMap;
 use glam::DVec3;
+use std::borrow::Cow;
 use std::mem::take;
 use std::ops::Range;
 use tetralod::geom::{ON_LATTICE, PointGrid, TetPlaces, weights_on_triangle};
-use tetralod::mesh::{TetMesh, boundary_faces};
-use tetralod::mt::{ApplyUpdates, CurrentMesh, ErrorCode, FieldInfo, MtInfo, UpdateId};
+use tetralod::mesh::{BitSet, TetMesh, boundary_faces};
+use tetralod::mt::{ApplyUpdates, CurrentMesh, ErrorCode, FieldInfo, MtInfo, Regions, UpdateId};
 use tetralod::refine::{Need, Part};
 
 /// The input, prepared for being compared with.
 pub struct Deviation<'a> {
     info: &'a MtInfo,
-    input: &'a TetMesh,
+    /// With a point for each region where fields jump.
+    input: Cow<'a, TetMesh>,
+    /// The tetrahedra without these.
+    joined: &'a [[u32; 4]],
+    /// The region of each point where fields jump; else empty.
+    regions: Vec<u16>,
+    /// Whether interfaces may have moved: then a point may be in another region.
+    may_move: bool,
     points: PointGrid,
     /// The input's own positions, in steps of the lattice.
     places: Vec<DVec3>,
@@ -40,6 +49,8 @@ struct Inside {
     /// Where a tetrahedron's vertices are, by its hash.
     of_tet: HashMap<u64, Range<usize>>,
     points: Vec<u32>,
+    /// Reference vertices that have been in another region than theirs.
+    elsewhere: BitSet,
     /// The interpolated values, as fractions of each field's range: `shown[i * fields + f]`.
     shown: Vec<f64>,
 }
@@ -61,22 +72,30 @@ pub fn check_counts(info: &MtInfo, input: &TetMesh) -> Result<(), String> {
 impl<'a> Deviation<'a> {
     /// Prepares to compare with `input`, which has to be what `info` says. About `vertices` of the reference vertices
     /// are measured.
-    pub fn new(info: &'a MtInfo, input: &'a TetMesh, vertices: usize) -> Result<Self, String> {
+    pub fn new(
+        info: &'a MtInfo,
+        regions: Option<&Regions>,
+        input: &'a TetMesh,
+        vertices: usize,
+    ) -> Result<Self, String> {
         check_counts(info, input)?;
         let neighbors =
             tetralod::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
         let faces = boundary_faces(&input.tets, &neighbors).map(|(_, face)| face).collect();
         drop(neighbors);
-        Self::of(info, input, faces, vertices)
+        Self::of(info, regions, input, faces, vertices)
     }
 
     /// Prepares to compare with what the input has in some place, given the faces of its boundary there.
     pub fn of(
         info: &'a MtInfo,
+        regions: Option<&Regions>,
         input: &'a TetMesh,
         faces: Vec<[u32; 3]>,
         vertices: usize,
     ) -> Result<Self, String> {
+        let joined = &input.tets[..];
+        let Split { mesh: input, regions: of_points } = split(input, regions)?;
         let points = input.positions.len();
         let mut fields = Vec::new();
         for field in &info.fields {
@@ -86,7 +105,14 @@ impl<'a> Deviation<'a> {
         let positions: Vec<[i32; 3]> = input.positions.iter().map(|p| info.lattice.nearest(*p)).collect();
         let each = || (0..points).flat_map(|v| fields.iter().zip(&info.fields).map(move |(f, i)| (f[v], i)));
         let (origin, step) = (DVec3::from(info.lattice.origin), DVec3::from(info.lattice.step));
-        let places = input.positions.iter().map(|p| (DVec3::from(*p) - origin) / step).collect();
+        let mut places: Vec<DVec3> =
+            input.positions.iter().map(|p| (DVec3::from(*p) - origin) / step).collect();
+        // Beside where the lattice has put a vertex of an interface there may be another region.
+        for ((place, position), _) in
+            places.iter_mut().zip(&positions).zip(&of_points).filter(|(_, (_, several))| *several)
+        {
+            *place = DVec3::from_array(position.map(f64::from));
+        }
         let levels = each().map(|(value, field)| field.nearest(value)).collect();
         let values = each().map(|(value, field)| value / field.range()).collect();
         let boundary = Surface::new(info, faces.iter().map(|face| face.map(|v| positions[v as usize])));
@@ -94,6 +120,9 @@ impl<'a> Deviation<'a> {
         let slack = 1e-9 * tetralod::geom::Bounds::of(&input.positions).diagonal();
         Ok(Self {
             info,
+            joined,
+            regions: of_points.into_iter().map(|(region, _)| region).collect(),
+            may_move: regions.is_some_and(|regions| regions.deviation > 0.0),
             input,
             points: PointGrid::new(positions),
             places,
@@ -112,10 +141,23 @@ impl<'a> Deviation<'a> {
         PlainReference { positions: self.points.points(), levels: &self.levels, tets: &self.input.tets }
     }
 
+    /// The input on the lattice with one vertex for all regions that meet there.
+    pub fn joined(&self) -> PlainReference<'_> {
+        let [points, tets] = [self.info.vertices as usize, self.joined.len()];
+        let points = if tets == 0 { self.points.points().len() } else { points };
+        PlainReference { positions: &self.points.points()[..points], levels: &self.levels, tets: self.joined }
+    }
+
+    /// Whether a tetrahedron is of the region of a point.
+    fn is_beside(&self, point: u32, mesh: &PlainMesh<'_>, t: u32) -> bool {
+        let own = self.regions.get(point as usize);
+        own.is_none_or(|own| mesh.mesh.regions().get(t as usize) == Some(own))
+    }
+
     /// The errors that each need allows at the reference vertices; `bounds` are the guaranteed ones.
     pub fn asks<'n>(&self, needs: &'n [Need], bounds: &[f64]) -> Vec<Ask<'n>> {
         let ask = |(need, &bound): (&'n Need, &f64)| {
-            let mut ask = Ask::new(self.info, self.input, need, bound);
+            let mut ask = Ask::new(self.info, &self.input, need, bound);
             let unseen = ask.allowed.iter_mut().enumerate().filter(|(point, _)| point % self.stride != 0);
             unseen.for_each(|(_, allowed)| *allowed = f64::INFINITY);
             ask
@@ -224,7 +266,7 @@ impl Look<'_> {
             let key = hash_of_tet(tet.map(|v| hashes[v as usize]));
             let range = match inside.of_tet.get(&key) {
                 Some(range) => range.clone(),
-                None => self.locate(tet, key, inside),
+                None => self.locate((t, tet), key, inside),
             };
             for i in range {
                 let point = inside.points[i];
@@ -237,6 +279,7 @@ impl Look<'_> {
                 }
             }
         }
+        let in_other = &inside.elsewhere;
         for (k, ask) in self.asks.iter().enumerate() {
             let mut failures = Failures::default();
             for (point, &allowed) in ask.allowed.iter().enumerate() {
@@ -245,6 +288,10 @@ impl Look<'_> {
                 }
                 let inside = least[point * asks + k];
                 // A vertex inside of the mesh has one place; only one outside of the moved boundary has a choice.
+                if self.of.may_move && !inside.is_finite() && in_other.has(point as u32) {
+                    // The interface has moved over it.
+                    continue;
+                }
                 let at_border = || self.ratio_at_border(ask, point as u32, found.worst_ratio.min(1.0));
                 let ratio = if inside.is_finite() { inside } else { at_border() };
                 found.worst_ratio = found.worst_ratio.max(ratio);
@@ -273,7 +320,7 @@ impl Look<'_> {
     }
 
     /// Finds out which reference vertices are inside of a tetrahedron, but for common ones at its corners, and what is shown there.
-    fn locate(&self, tet: &[u32; 4], key: u64, inside: &mut Inside) -> Range<usize> {
+    fn locate(&self, (t, tet): (u32, &[u32; 4]), key: u64, inside: &mut Inside) -> Range<usize> {
         let corners = tet.map(|v| self.mesh.positions[v as usize]);
         let is_corner = |point: u32, position: [i32; 3]| {
             let mut at = (0..4).filter(|&i| corners[i] == position);
@@ -288,6 +335,11 @@ impl Look<'_> {
             }
             let places = places.get_or_insert_with(|| TetPlaces::new(corners));
             if let Some(weights) = places.weights(position, place) {
+                if !self.of.is_beside(point, self.mesh, t) {
+                    // On an interface it is in another region, too.
+                    inside.elsewhere.insert(point);
+                    return;
+                }
                 inside.points.push(point);
                 self.interpolate(tet, weights, &mut inside.shown);
             }
@@ -381,6 +433,9 @@ impl Look<'_> {
                 return true;
             }
             let (t, face) = self.border.faces[i as usize];
+            if !self.of.is_beside(point, self.mesh, t) {
+                return false;
+            }
             let tet = &self.mesh.tets[t as usize];
             let own = weights_on_triangle(q, self.border.surface.triangles.corners[i as usize]);
             let weights = tet.map(|v| face.iter().zip(own).find(|(w, _)| **w == v).map_or(0.0, |(_, x)| x));

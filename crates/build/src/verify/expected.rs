@@ -2,6 +2,7 @@
 
 use super::fronts::satisfy;
 use super::queries::Query;
+use foldhash::HashMap;
 use tetralod::mesh::BitSet;
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, MultiTessellation, ReplayError, UpdateId, VertexId,
@@ -20,22 +21,35 @@ pub struct Expected {
     changes: Vec<u64>,
     /// The region of each tetrahedron; empty if the MT has none.
     regions: Vec<u16>,
+    /// The levels of vertices in single regions where fields jump.
+    sides: Sides,
 }
+
+/// Levels by vertex and region.
+type Sides = HashMap<(u32, u16), Vec<i32>>;
 
 impl Expected {
     pub fn of(mt: &impl ApplyUpdates) -> Result<Self, String> {
         let damaged = |error: ReplayError| format!("the updates: {error}");
-        let regions = regions_of(mt).map_err(damaged)?;
+        let (regions, sides) = regions_of(mt).map_err(damaged)?;
         let mt = ExplicitMt::of(mt).map_err(damaged)?;
         let of_vertex = |v| hash_of_vertex(v, mt.position(v), mt.levels(v));
         let vertices: Vec<u64> = (0..mt.vertices()).map(VertexId).map(of_vertex).collect();
-        let of_tet = |t: u32| hash_of_tet(mt.tets()[t as usize].map(|v| vertices[v as usize]));
+        let of_tet = |t: u32| {
+            let side = |v: u32| {
+                let levels = sides.get(&(v, regions.get(t as usize).copied().unwrap_or(0)));
+                levels.map_or(vertices[v as usize], |levels| {
+                    hash_of_vertex(VertexId(v), mt.position(VertexId(v)), levels)
+                })
+            };
+            hash_of_tet(mt.tets()[t as usize].map(side))
+        };
         let base = sum(mt.base_tets().map(of_tet));
         let inserted = |u| sum(mt.inserted(u).map(of_tet));
         let removed = |u| sum(mt.removed(u).iter().map(|&t| of_tet(t)));
         let change = |u| inserted(u).wrapping_sub(removed(u));
         let changes = (0..mt.updates()).map(UpdateId).map(change).collect();
-        Ok(Self { mt, base, changes, regions })
+        Ok(Self { mt, base, changes, regions, sides })
     }
 
     /// The hash of the mesh of a request. Which mesh is the best within a budget takes refinement to find out: from `base`, the base mesh.
@@ -73,7 +87,9 @@ impl Expected {
         let mt = &self.mt;
         let tet = mt.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| mt.position(v));
-        let levels = |field: usize| tet.map(|v| mt.levels(v)[field]);
+        let region = self.regions.get(t as usize).copied().unwrap_or(0);
+        let in_region = |v: VertexId| self.sides.get(&(v.0, region)).map_or(mt.levels(v), |levels| levels);
+        let levels = |field: usize| tet.map(|v| in_region(v)[field]);
         let own: Vec<ErrorCode>;
         let errors = if mt.has_tet_errors() {
             own = (0..mt.fields()).map(|f| mt.own_error(update, f, mt.quarterings_of(t))).collect();
@@ -82,30 +98,41 @@ impl Expected {
             mt.errors(update)
         };
         let error = errors.iter().max().copied().unwrap_or_default();
-        let region = self.regions.get(t as usize).copied().unwrap_or(0);
         let look = TetData { corners: &corners, levels: &levels, error, errors, update, region };
         criterion.judge(&look).violates()
     }
 }
 
-/// The region of each tetrahedron of the explicit form of an MT; empty if it has none.
-fn regions_of(mt: &impl ApplyUpdates) -> Result<Vec<u16>, ReplayError> {
-    let Some(regions) = mt.regions() else { return Ok(Vec::new()) };
+/// The region of each tetrahedron of the explicit form of an MT, empty if it has none, and the levels of vertices in their regions if
+/// fields jump.
+fn regions_of(mt: &impl ApplyUpdates) -> Result<(Vec<u16>, Sides), ReplayError> {
+    let Some(regions) = mt.regions() else { return Ok((Vec::new(), Sides::default())) };
     let mut all = regions.of_base.clone();
+    let mut sides = Sides::default();
     let mut mesh = mt.start()?;
+    let jumps = !regions.sides.jumps.is_empty();
+    let mut note = |mesh: &CurrentMesh, t: u32| {
+        for slot in mesh.tet(t).into_iter().flatten().filter(|_| jumps) {
+            let key = (mesh.vertex(slot).0, mesh.regions()[t as usize]);
+            sides.entry(key).or_insert_with(|| mesh.levels(slot).to_vec());
+        }
+    };
+    (0..mesh.tet_slots() as u32).for_each(|t| note(&mesh, t));
     mt.updates_arrived(&mut mesh, 0);
     for u in (0..mt.updates()).map(UpdateId) {
         mt.refine(&mut mesh, u)?;
         let inserted = mt.find_inserted(&mut mesh, u)?;
         // As that form orders those of an update.
         let named = |&t: &u32| {
-            (canonical(mesh.tets()[t as usize].map(|v| mesh.vertex(v).0)), mesh.regions()[t as usize])
+            let tet = mesh.joined_tets()[t as usize];
+            (canonical(tet.map(|v| mesh.vertex(v).0)), mesh.regions()[t as usize])
         };
+        inserted.iter().for_each(|&t| note(&mesh, t));
         let mut own: Vec<([u32; 4], u16)> = inserted.iter().map(named).collect();
         own.sort_unstable();
         all.extend(own.into_iter().map(|(_, region)| region));
     }
-    Ok(all)
+    Ok((all, sides))
 }
 
 /// The hash of each vertex of a packed mesh.

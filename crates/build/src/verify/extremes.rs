@@ -8,14 +8,15 @@ use tetralod::mt::{FieldInfo, MtInfo};
 pub fn check(info: &MtInfo, input: &TetMesh, report: &mut VerifyReport) {
     for field in &info.fields {
         let Some(found) = input.fields.iter().find(|found| field.is_of(found)) else { continue };
-        let fault = fault(field, found, &input.positions);
+        let fault = fault(field, found, input);
         let place = format!("extremes of field '{}'", field.name);
         fault.iter().for_each(|fault| note(report, &place, fault));
     }
 }
 
-fn fault(field: &FieldInfo, found: &Field, positions: &[[f64; 3]]) -> Option<String> {
-    let values = || found.values.iter().copied().zip(positions.iter().copied());
+fn fault(field: &FieldInfo, found: &Field, TetMesh { positions, sides, .. }: &TetMesh) -> Option<String> {
+    let places = || positions.iter().chain(sides.iter().map(|side| &positions[side.point as usize]));
+    let values = || found.all_values().copied().zip(places().copied());
     if let (Some(stated), Some(known)) = (&field.extremes, Extremes::of(values())) {
         for (stated, known) in stated.both().into_iter().zip(known.both()) {
             let Extreme { value, place, .. } = stated;

@@ -11,6 +11,8 @@ pub struct PlainMesh<'a> {
     pub mesh: &'a CurrentMesh,
     pub positions: &'a [[i32; 3]],
     pub tets: &'a [[u32; 4]],
+    /// The same with one vertex for all regions that meet there.
+    joined: &'a [[u32; 4]],
     pub neighbors: &'a [[u32; 4]],
 }
 
@@ -84,20 +86,21 @@ impl Face {
 impl<'a> PlainMesh<'a> {
     /// The mesh, which must be packed.
     pub fn of(mesh: &'a CurrentMesh) -> Self {
-        Self { mesh, positions: mesh.positions(), tets: mesh.tets(), neighbors: mesh.neighbors() }
+        let joined = mesh.joined_tets();
+        Self { mesh, positions: mesh.positions(), tets: mesh.tets(), joined, neighbors: mesh.neighbors() }
     }
 
     /// Everything that makes a valid mesh.
     pub fn check(&self, reference: &Shape) -> Result<(), String> {
         self.check_vertices()?;
         self.check_orientation()?;
-        let mut around = Around::new(self.positions.len(), self.tets)?;
+        let mut around = Around::new(self.positions.len(), self.joined)?;
         let (mut faces, mut count) = (Vec::new(), Counts::new(self.tets.len()));
         for v in 0..self.positions.len() as u32 {
             count.add(v, around.at(v, &mut faces), &faces);
             self.check_faces(&faces)?;
         }
-        let shape = count.shape(self.positions.len(), self.tets.len())?;
+        let shape = count.shape(self.count_joined()?, self.tets.len())?;
         if shape != *reference {
             return Err(format!("the topology has changed: {shape}; of the input: {reference}"));
         }
@@ -120,6 +123,23 @@ impl<'a> PlainMesh<'a> {
             return Err(format!("{count} vertices and {} tetrahedra, reported {counted:?}", self.tets.len()));
         }
         Ok(())
+    }
+
+    /// How many vertices there are if those of several regions are one. All have their places.
+    fn count_joined(&self) -> Result<usize, String> {
+        let mut used = vec![false; self.positions.len()];
+        if self.joined.len() != self.tets.len() {
+            return Err("tetrahedra with shared vertices are not as many".to_owned());
+        }
+        for (t, (tet, joined)) in self.tets.iter().zip(self.joined).enumerate() {
+            for (&v, &w) in tet.iter().zip(joined) {
+                used[w as usize] = true;
+                if self.positions[v as usize] != self.positions[w as usize] {
+                    return Err(format!("tetrahedron {t} is elsewhere with shared vertices"));
+                }
+            }
+        }
+        Ok(used.iter().filter(|used| **used).count())
     }
 
     fn check_orientation(&self) -> Result<(), String> {

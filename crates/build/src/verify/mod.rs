@@ -51,6 +51,7 @@ mod report;
 mod same;
 mod samples;
 mod shown;
+mod split;
 mod surfaces;
 
 #[doc(hidden)]
@@ -62,6 +63,8 @@ pub use report::VerifyReport;
 pub use samples::{run_request, samples};
 #[doc(hidden)]
 pub use shown::run_shown;
+#[doc(hidden)]
+pub use split::split;
 
 use case::{Case, check_budget};
 use deviation::Deviation;
@@ -200,7 +203,7 @@ fn verify<M: ApplyUpdates>(
     on_progress: &mut dyn FnMut(u32, u32),
     report: &mut VerifyReport,
 ) -> Result<(), String> {
-    let mut deviation = Deviation::new(mt.info(), input, *vertices)?;
+    let mut deviation = Deviation::new(mt.info(), mt.regions(), input, *vertices)?;
     let untouched = fresh(mt)?;
     let kept = mt.regions().map(|regions| KeptRegions::of(regions, &PlainMesh::of(untouched.mesh())));
     let kept = kept.transpose()?;
@@ -289,7 +292,7 @@ fn check_full_circle(
     if front.applied_count() != 0 || front.mesh().hash() != base {
         note(report, &none, "what is left is not the base mesh");
     }
-    let shape = mesh_checks::Shape::of(&deviation.reference());
+    let shape = mesh_checks::Shape::of(&deviation.joined());
     Ok((shape.map_err(|failure| format!("the input: {failure}"))?, front))
 }
 

@@ -56,7 +56,7 @@ impl<'a> KeptRegions<'a> {
 }
 
 /// The labels of each tetrahedron of the input.
-fn labels_of(input: &TetMesh, arrays: &[String]) -> Result<Vec<Vec<i64>>, String> {
+pub(super) fn labels_of(input: &TetMesh, arrays: &[String]) -> Result<Vec<Vec<i64>>, String> {
     let arrays = arrays.iter().map(|name| labels(input, name)).collect::<Result<Vec<_>, _>>();
     let arrays = arrays.map_err(|error| format!("the input: {error}"))?;
     Ok((0..input.tets.len()).map(|t| arrays.iter().map(|array| array[t]).collect()).collect())

@@ -69,6 +69,11 @@ fn check<M: ApplyUpdates>(
 ) -> Result<(), String> {
     let info = mt.info();
     check_counts(info, input)?;
+    if mt.regions().is_some_and(|regions| !regions.sides.jumps.is_empty()) {
+        return Err(
+            "fields have values for each region: verify the file as a whole, without samples".to_owned()
+        );
+    }
     let around = match &query.request.needs[..] {
         [need] => region(need).map(|inside| (inside, need)),
         _ => None,
@@ -82,7 +87,7 @@ fn check<M: ApplyUpdates>(
         }
         None => Near::sparse(input)?,
     };
-    let mut deviation = Deviation::of(info, &near.mesh, near.faces, most)?;
+    let mut deviation = Deviation::of(info, None, &near.mesh, near.faces, most)?;
     let base = fresh(mt)?;
     let plain = PlainMesh::of(base.mesh());
     let shape = Shape::of(&PlainReference { positions: plain.positions, levels: &[], tets: plain.tets })

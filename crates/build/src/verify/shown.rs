@@ -9,7 +9,7 @@ use super::history::Numbers;
 use super::report::{VerifyReport, note};
 use glam::DVec3;
 use tetralod::geom::{Bounds, PointGrid};
-use tetralod::mesh::{FACES, TetMesh};
+use tetralod::mesh::{FACES, Side, TetMesh};
 use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo};
 use tetralod::refine::{Need, Part, Request};
 use tetralod::session::{Session, SessionError};
@@ -66,7 +66,9 @@ fn check(
             let known = input.fields.iter().find(|known| field.is_of(known));
             if let Some(known) = known.filter(|_| matches!(request.needs[0].part, Part::Everywhere)) {
                 let bound = info.field_bound(f, stats.error_bound);
-                let vertices = Vertices { positions: &input.positions, values: &known.values, reference };
+                let sides = if known.sides.is_empty() { &[][..] } else { &input.sides };
+                let (positions, values) = (&input.positions[..], &known.values[..]);
+                let vertices = Vertices { positions, values, sides, reference };
                 check(
                     "probes at the input's vertices",
                     exact.check_vertices(session, vertices, bound, &mut numbers),
@@ -85,6 +87,8 @@ fn check(
 struct Vertices<'a> {
     positions: &'a [[f64; 3]],
     values: &'a [f64],
+    /// Those with several values.
+    sides: &'a [Side],
     reference: Reference,
 }
 
@@ -230,8 +234,10 @@ impl<'a> Exact<'a> {
         bound: f64,
         numbers: &mut Numbers,
     ) -> Result<(), String> {
-        let Vertices { positions, values, reference } = vertices;
-        let chosen: Vec<usize> = (0..PROBES).map(|_| numbers.next() as usize % positions.len()).collect();
+        let Vertices { positions, values, sides, reference } = vertices;
+        let mut chosen: Vec<usize> = (0..PROBES).map(|_| numbers.next() as usize % positions.len()).collect();
+        // A probe says the value in one of the regions that meet at a point.
+        chosen.retain(|v| sides.binary_search_by_key(v, |side| side.point as usize).is_err());
         let lattice = &self.info.lattice;
         let place = |p: [f64; 3]| match reference {
             Reference::Mesh => p,

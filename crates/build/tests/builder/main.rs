@@ -4,6 +4,7 @@ mod delaunay;
 mod exact_values;
 mod fields;
 mod flat_boundaries;
+mod jumps;
 mod measure;
 mod parts;
 mod pieces;

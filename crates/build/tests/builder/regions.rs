@@ -3,7 +3,7 @@
 use crate::support::meshes::blocks;
 use std::collections::BTreeSet;
 use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, encode};
-use tetralod::mesh::{Field, NONE, TetMesh};
+use tetralod::mesh::{CellsToPoints, Field, NONE, TetMesh};
 use tetralod::mt::{
     Applied, ApplyUpdates, CurrentMesh, HalfEdgeMt, Mt, MtKind, MultiTessellation, RegionInfo, Regions,
     UpdateId, UpdatePages,
@@ -256,7 +256,7 @@ fn parts_that_hang_together_by_faces_are_regions_and_cost_nothing() {
     let mesh = blocks([N; 3], &[field], |[x, y, _]| x < 5 || x > 6 && y != 4);
     let [plain, parted] = [vec![], vec!["components".to_owned()]].map(|preserve| {
         let mut mesh = mesh.clone();
-        mesh.settle_cells(false, &preserve);
+        mesh.settle_cells(CellsToPoints::No, &preserve);
         let config = BuildConfig { preserve, ..BuildConfig::default() };
         build(&mesh, &config).expect("a mesh to build on").mt
     });
@@ -277,7 +277,7 @@ fn parts_that_hang_together_by_faces_are_regions_and_cost_nothing() {
     let mut labelled = mesh;
     labelled.cell_fields = vec![Field::new("components", vec![7.0; labelled.tets.len()])];
     let config = BuildConfig { preserve: vec!["components".into()], ..BuildConfig::default() };
-    labelled.settle_cells(false, &config.preserve);
+    labelled.settle_cells(CellsToPoints::No, &config.preserve);
     let mt = build(&labelled, &config).expect("a mesh to build on").mt;
     assert!(matches!(&regions(&mt).all[..], [RegionInfo { labels, .. }] if labels[..] == [7]));
 }

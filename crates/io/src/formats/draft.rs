@@ -124,7 +124,8 @@ impl<'a> Draft<'a> {
         split.spread(&mut cell_fields);
         self.input.append(split.input);
         let Self { input, notes, .. } = self;
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input, notes })
+        let tets = split.tets;
+        Ok(TetMesh { positions, fields, tets, cell_fields, input, notes, ..TetMesh::default() })
     }
 }
 
