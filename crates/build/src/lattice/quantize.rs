@@ -241,14 +241,9 @@ pub(crate) fn on_lattices(
     fields: Vec<FieldInfo>,
     sides: Sides,
 ) -> Quantized {
-    let vertices = mesh.positions.len();
-    let value = |field: &Field, i: usize| match i.checked_sub(vertices) {
-        None => field.values[i],
-        Some(side) if sides::jumps(field) => field.sides[side],
-        Some(side) => field.values[mesh.sides[side].point as usize],
-    };
-    let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (value(field, i), info));
-    let points = 0..vertices + sides.len();
+    let per_point =
+        |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (sides::value(mesh, field, i), info));
+    let points = 0..mesh.positions.len() + sides.len();
     let levels = points.clone().flat_map(|i| per_point(i).map(|(value, info)| info.nearest(value))).collect();
     let exact = points.flat_map(|i| per_point(i).map(|(x, info)| (x - info.origin) / info.step)).collect();
     Quantized::new(mesh, placed, fields, (levels, exact), sides)

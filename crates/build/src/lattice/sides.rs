@@ -28,17 +28,24 @@ impl Sides {
         if !jumps.contains(&true) {
             return Self::default();
         }
-        let points = mesh.positions.len();
-        let mut first = vec![u32::MAX; points];
+        let mut first = vec![u32::MAX; mesh.positions.len()];
         for (tet, &region) in mesh.tets.iter().zip(regions) {
             tet.iter().for_each(|&v| first[v as usize] = region.min(first[v as usize]));
         }
-        let further: Arc<[(u32, u32)]> =
-            mesh.sides.iter().map(|side| (side.point, regions[side.tet as usize])).collect();
+        let further = mesh.sides.iter().map(|side| (side.point, regions[side.tet as usize]));
+        Self::new(jumps, first, further.collect())
+    }
+
+    /// Those of vertices with these first regions, given the vertex and the region of each, ascending; none if no field jumps.
+    pub fn new(jumps: Vec<bool>, first: Vec<u32>, further: Vec<(u32, u32)>) -> Self {
+        if jumps.is_empty() {
+            return Self::default();
+        }
+        let points = first.len();
         let mut starts = vec![0; points + 1];
         further.iter().for_each(|(v, _)| starts[*v as usize + 1] += 1);
         (0..points).for_each(|v| starts[v + 1] += starts[v]);
-        Self { jumps, first, further, starts }
+        Self { jumps, first, further: further.into(), starts }
     }
 
     /// Whether no field jumps.
@@ -87,6 +94,15 @@ impl Sides {
     fn of_vertex(&self, v: u32) -> std::ops::Range<u32> {
         let v = v as usize;
         if self.is_empty() { 0..0 } else { self.starts[v]..self.starts[v + 1] }
+    }
+}
+
+/// The value of a field at a point of the input, or of its sides behind these.
+pub(crate) fn value(mesh: &TetMesh, field: &Field, point: usize) -> f64 {
+    match point.checked_sub(mesh.positions.len()) {
+        None => field.values[point],
+        Some(side) if jumps(field) => field.sides[side],
+        Some(side) => field.values[mesh.sides[side].point as usize],
     }
 }
 

@@ -4,7 +4,7 @@
 //! appended one by one, as for a whole.
 
 use super::PartsError;
-use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};
+use super::piece::{Made, Part, PartUpdates, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::decimate::append::{Appender, Ordered};
 use crate::lattice::sides::Sides;
@@ -40,7 +40,9 @@ pub fn assemble(
     info.updates = listed.vertices.len() as u32;
     info.bounds = lattice_box(piece.positions.iter().copied());
     let level = |(&value, field): (&f64, &FieldInfo)| field.nearest(value);
-    let levels: Vec<i32> = piece.values.iter().zip(info.fields.iter().cycle()).map(level).collect();
+    let Sided { first, further, values: of_sides } = piece.sided;
+    let all = piece.values.iter().chain(&of_sides);
+    let levels: Vec<i32> = all.zip(info.fields.iter().cycle()).map(level).collect();
     let numbered = number_base(&piece.positions, &levels, info.fields.len(), &piece.tets);
     let summary = BuildSummary::of(&info, &numbered.mesh, 0);
     listed.check(&numbered)?;
@@ -50,7 +52,7 @@ pub fn assemble(
         base_marks.push((remover, inner));
     }
     let ordered = Ordered { vertices: &listed.vertices, near: &listed.near, base_marks: &base_marks };
-    let sides = Sides::default();
+    let sides = Sides::new(plan.jumps(), first, further);
     let reference = (&piece.positions[..], &levels[..], &sides);
     let unknown = PartsError::Damaged { what: "its tetrahedra are of other regions" };
     let regions = plan.regions.as_ref().map(|regions| regions.of_base(&piece.regions).ok_or(unknown));
@@ -60,7 +62,7 @@ pub fn assemble(
     let depths = vec![1; vertices.len()];
     drop(vertices);
     // Of the piece only the exact values may still be needed.
-    let Piece { values, .. } = piece;
+    let values = piece.values;
     let values = if plan.fields.iter().any(|field| field.lossless) { values } else { Vec::new() };
     let mut assembly = Assembly { appender, numbers, depths, fields: info.fields.len(), done: 0 };
     assembly.append_all(&plan, updates, progress)?;

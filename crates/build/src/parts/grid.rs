@@ -184,7 +184,7 @@ impl<'a> GridCut<'a> {
         let info = self.info(config)?;
         let sides = self.position(self.grid.dims.map(|n| n - 1));
         let whole = (self.boxes.len() as u32, self.checksum(), sides);
-        let plan = Plan::new(&info, config, purpose, whole, None, metadata);
+        let plan = Plan::new(&info, config, purpose, whole, (None, &[]), metadata);
         // Angles are measured by the lattices alone.
         let alone = quantize::lattices_alone(info.lattice, info.fields.clone(), info.quantization);
         Restrictions::of_angles(config, &alone)?;

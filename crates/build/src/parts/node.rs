@@ -3,7 +3,7 @@
 //! A part is decimated like a whole, but for its open vertices, and until an eighth of its tetrahedra is left.
 
 use super::PartsError;
-use super::piece::{Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, UpdateRows};
+use super::piece::{Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::change::work_mesh::{ELSEWHERE, WorkMesh};
 use crate::decimate::candidate_queue::Levels;
@@ -77,7 +77,7 @@ pub fn join(
 fn run(head: Head, piece: Piece, progress: OnProgress<'_>) -> Result<(Part, PartUpdates), PartsError> {
     let Head { plan, node, .. } = head;
     let info = plan.info();
-    let quantized = quantized(&info, &piece);
+    let quantized = quantized(&plan, &info, &piece);
     let topology = topology(piece.points.len(), &piece.tets).map_err(BuildError::from)?;
     let state = state(&plan, node, (&piece, topology), &quantized)?;
     let earlier: Vec<ErrorCode> = piece.earlier_errors.iter().copied().map(ErrorCode).collect();
@@ -108,9 +108,10 @@ fn of_step(now: BuildProgress, before: usize, enough: u32) -> BuildProgress {
 }
 
 /// The reference vertices of a piece on the lattices of the whole.
-fn quantized(info: &MtInfo, piece: &Piece) -> Quantized {
+fn quantized(plan: &Plan, info: &MtInfo, piece: &Piece) -> Quantized {
     let fields = &info.fields;
-    let per_value = || piece.values.iter().zip(fields.iter().cycle());
+    let Sided { first, further, values } = &piece.sided;
+    let per_value = || piece.values.iter().chain(values).zip(fields.iter().cycle());
     let positions: Arc<[[i32; 3]]> = piece.positions.as_slice().into();
     let place = |point: usize| match piece.moved.binary_search_by_key(&(point as u32), |(v, _)| *v) {
         Ok(at) => DVec3::from_array(piece.moved[at].1),
@@ -121,9 +122,10 @@ fn quantized(info: &MtInfo, piece: &Piece) -> Quantized {
         fields: fields.clone(),
         levels: per_value().map(|(&value, field)| field.nearest(value)).collect(),
         exact: per_value().map(|(&value, field)| (value - field.origin) / field.step).collect(),
-        places: Places::new(positions.clone(), (0..positions.len()).map(place)),
+        places: Places::new(positions.clone(), (0..positions.len()).map(place))
+            .with_sides(further.iter().map(|(v, _)| *v)),
         positions,
-        sides: Sides::default(),
+        sides: Sides::new(plan.jumps(), first.clone(), further.clone()),
         locations: Vec::new(),
         quantization: info.quantization,
     }
@@ -299,6 +301,7 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
         shared: piece.shared,
         interface: piece.interface,
         kept: piece.kept,
+        sided: piece.sided,
         ..left
     };
     (Part { head: head.clone(), piece }, PartUpdates { head, rows })
@@ -309,9 +312,11 @@ fn joined(plan: &Plan, node: Node, pieces: Vec<Piece>) -> Piece {
     let mut all = Piece::over(pieces.iter().map(|piece| &piece.points), plan.fields.len());
     let own = plan.parts_of(node);
     let is_open = |&(_, first, last): &(u32, u32, u32)| !own.contains(&first) || !own.contains(&last);
-    for piece in pieces {
-        let of_point = all.put(&piece.points, &piece.positions, &piece.values, &piece.shortest);
-        let number = |v: u32| of_point[v as usize];
+    let put = |piece: &Piece| all.put(&piece.points, &piece.positions, &piece.values, &piece.shortest);
+    let mut numbers: Vec<Vec<u32>> = pieces.iter().map(put).collect();
+    all.sided = Sided::joined(&pieces, all.points.len(), plan.fields.len(), &mut numbers);
+    for (piece, numbers) in pieces.into_iter().zip(numbers) {
+        let number = |v: u32| numbers[v as usize];
         let (first_tet, first_made) = (all.tets.len() as u32, all.earlier.len() as u32);
         let in_bucket = |&(v, t): &(u32, u32)| (number(v), first_tet + t);
         all.moved.extend(piece.moved.iter().map(|&(v, place)| (number(v), place)));

@@ -6,16 +6,16 @@ use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
 use super::fragments::{InParts, ends, joined, ranks};
 use super::grid::GridCut;
-use super::piece::{Part, Piece};
+use super::piece::{Part, Piece, Sided};
 use super::plan::{Plan, PlanRegions, purpose};
 use crate::lattice::field_selection;
 use crate::lattice::quantize::{self, Quantized};
-use crate::lattice::sides::jumps;
+use crate::lattice::sides;
 use crate::restrict::restrictions::Restrictions;
 use crate::{BuildConfig, BuildCriterion, BuildError};
 use std::collections::BTreeMap;
 use tetralod::geom::Bounds;
-use tetralod::mesh::{FACES, TetMesh};
+use tetralod::mesh::{FACES, Field, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
 /// Parts `mesh`, which must be valid, or a grid alone ([`TetMesh::of_grid_alone`]), of which no more than the values and a part are in
@@ -54,20 +54,13 @@ pub fn part(
         return part(&whole, config, parts, metadata, put);
     }
     tetralod::mesh::check_arrays(mesh).map_err(BuildError::from)?;
-    // Pieces have one value for each point.
-    if let Some(field) = field_selection::fields(mesh, config)?.iter().find(|field| jumps(field)) {
-        let values = format!("values of field '{}' for each region", field.name);
-        let instead = "average fields across regions (mean_across_regions), or build the mesh as a whole";
-        let which = [values, "building in parts".to_owned()];
-        return Err(BuildError::Combination { which, instead }.into());
-    }
     let quantized = quantize::quantize_cells(mesh, config)?;
     let restrictions = Restrictions::of(config, mesh, &quantized, BuildCriterion::HalfEdge)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let info = quantized.info(mesh.tets.len(), displacement_per_error);
-    let whole = (parts, checksum(mesh), sides(&quantized.positions));
+    let whole = (parts, checksum(mesh), domain(&quantized.positions));
     let regions = restrictions.region_table().map(PlanRegions::new);
-    let plan = Plan::new(&info, config, purpose, whole, regions, metadata);
+    let plan = Plan::new(&info, config, purpose, whole, (regions, &quantized.sides.jumps), metadata);
     let part_of = parts_of(&mesh.tets, &quantized, parts)?;
     let ends = ends(mesh.positions.len(), &mesh.tets, &part_of);
     if let Some(point) = ends.iter().position(|[first, last]| first > last) {
@@ -92,13 +85,16 @@ pub fn part(
         let regions = regions.map(|(_, &region)| region).collect();
         let kept = (0..).zip(&piece.points).filter(|(_, v)| restrictions.keeps(**v));
         let kept = kept.map(|(i, _)| i).collect();
-        put(Part::of(&plan, index, Piece { regions, kept, ..piece }))
+        let of_sides = Sided::of(&piece.points, &quantized.sides, |point| {
+            chosen.iter().map(move |field| sides::value(mesh, field, point as usize))
+        });
+        put(Part::of(&plan, index, Piece { regions, kept, sided: of_sides, ..piece }))
     })?;
     Ok(plan)
 }
 
 /// The sides of the box around some positions.
-fn sides(positions: &[[i32; 3]]) -> [i32; 3] {
+fn domain(positions: &[[i32; 3]]) -> [i32; 3] {
     let ends = |k: usize| positions.iter().map(move |p| p[k]);
     [0, 1, 2].map(|k| ends(k).max().unwrap_or(0) - ends(k).min().unwrap_or(0))
 }
@@ -108,7 +104,7 @@ fn checksum(mesh: &TetMesh) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     mesh.positions.iter().flatten().for_each(|x| hasher.update(&x.to_le_bytes()));
     mesh.tets.iter().flatten().for_each(|v| hasher.update(&v.to_le_bytes()));
-    mesh.fields.iter().flat_map(|field| &field.values).for_each(|x| hasher.update(&x.to_le_bytes()));
+    mesh.fields.iter().flat_map(Field::all_values).for_each(|x| hasher.update(&x.to_le_bytes()));
     hasher.finalize()
 }
 

@@ -7,6 +7,7 @@
 use super::PartsError;
 use super::plan::{Node, Plan};
 use super::wire::{read_frame, read_magic, skip_frame, write_frame, write_magic};
+use crate::lattice::sides::Sides;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Seek, SeekFrom, Write};
 use tetralod::geom::orient3d;
@@ -76,10 +77,23 @@ pub(super) struct Piece {
     pub boundary: Vec<[u32; 3]>,
     /// The region of each tetrahedron, if regions are kept apart; else empty.
     pub regions: Vec<u32>,
+    /// Where fields jump between regions.
+    pub sided: Sided,
     /// Points that stay where they are, ascending.
     pub kept: Vec<u32>,
     /// How far the removal of each vertex reaches, once the part has been built: see `order::reach`.
     pub reaches: Vec<(u32, [[i32; 3]; 2])>,
+}
+
+/// The values of points in further regions: see `lattice::sides`. All is empty where no field jumps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sided {
+    /// The first region of each point in the whole.
+    pub first: Vec<u32>,
+    /// The point and the region of each side, ascending: all that the points have in the whole. As numbers they follow those of the points.
+    pub further: Vec<(u32, u32)>,
+    /// Side by side and field by field.
+    pub values: Vec<f64>,
 }
 
 /// Updates in their order, and what removes the tetrahedra of their stars.
@@ -133,6 +147,43 @@ impl From<RemoverCode> for Remover {
             Some(code) if code % 2 == 0 => Self::Own(code / 2),
             Some(code) => Self::Earlier(code / 2),
         }
+    }
+}
+
+impl Sided {
+    /// Those that these points have; `values` are the values of a point of the whole, or of one of its sides.
+    pub fn of<V: Iterator<Item = f64>>(points: &[u32], sides: &Sides, values: impl Fn(u32) -> V) -> Self {
+        if sides.is_empty() {
+            return Self::default();
+        }
+        let of = |(i, &v): (u32, &u32)| sides.further(v).map(move |(side, region)| (side, (i, region)));
+        let (own, further): (Vec<u32>, Vec<(u32, u32)>) = (0..).zip(points).flat_map(of).unzip();
+        let first = points.iter().map(|&v| sides.region(v)).collect();
+        Self { first, further, values: own.into_iter().flat_map(values).collect() }
+    }
+
+    /// Those of several pieces as those of one, of so many points; `numbers` has for each piece where its points are there, and gets where its sides
+    /// are.
+    pub fn joined(pieces: &[Piece], points: usize, fields: usize, numbers: &mut [Vec<u32>]) -> Self {
+        let own = |(piece, numbers): (&Piece, &Vec<u32>)| -> Vec<(u32, u32)> {
+            piece.sided.further.iter().map(|&(v, region)| (numbers[v as usize], region)).collect()
+        };
+        let of_pieces: Vec<Vec<(u32, u32)>> = pieces.iter().zip(&*numbers).map(own).collect();
+        let mut further = of_pieces.concat();
+        further.sort_unstable();
+        further.dedup();
+        let jumps = pieces.iter().any(|piece| !piece.sided.first.is_empty());
+        let mut first = vec![0; if jumps { points } else { 0 }];
+        let mut values = vec![0.0; further.len() * fields];
+        for ((Piece { sided, .. }, own), numbers) in pieces.iter().zip(of_pieces).zip(numbers) {
+            sided.first.iter().zip(&*numbers).for_each(|(&region, &v)| first[v as usize] = region);
+            for (side, of_side) in own.iter().zip(sided.values.chunks(fields)) {
+                let at = further.partition_point(|other| other < side);
+                values[at * fields..][..fields].copy_from_slice(of_side);
+                numbers.push((points + at) as u32);
+            }
+        }
+        Self { first, further, values }
     }
 }
 
@@ -296,6 +347,15 @@ impl Part {
             !piece.tets.is_empty() && piece.tets.iter().all(is_positive),
             "a tetrahedron is not positive",
         )?;
+        let regions = plan.region_count();
+        let Sided { first, further, values } = &piece.sided;
+        let of_regions = if plan.jumps().is_empty() { 0 } else { points };
+        let is_side = |(v, region): &(u32, u32)| (*v as usize) < points && *region < regions;
+        let are_sides = further.iter().all(is_side) && further.windows(2).all(|pair| pair[0] < pair[1]);
+        let has_all = first.len() == of_regions && values.len() == further.len() * fields;
+        expect(has_all && (of_regions > 0 || further.is_empty()), "its points lack values of regions")?;
+        let are_known = first.iter().all(|region| *region < regions) && values.iter().all(|x| x.is_finite());
+        expect(are_sides && are_known, "its points are of other regions")?;
         let (tets, earlier) = (piece.tets.len(), piece.earlier.len());
         let labelled = if plan.regions.is_some() { tets } else { 0 };
         expect(piece.regions.len() == labelled, "its tetrahedra lack regions")?;
@@ -306,10 +366,11 @@ impl Part {
         expect(piece.earlier_errors.len() == earlier * fields, "its updates lack errors")?;
         expect(piece.earlier.iter().all(|made| plan.has(made.node)), "its updates are others")?;
         let is_point = |v: &u32| (*v as usize) < points;
-        let in_bucket = |(v, t): &(u32, u32)| is_point(v) && (*t as usize) < tets;
+        let is_any = |v: &u32| (*v as usize) < points + further.len();
+        let in_bucket = |(v, t): &(u32, u32)| is_any(v) && (*t as usize) < tets;
         let buckets = [&piece.inside, &piece.border, &piece.foreign];
         expect(buckets.iter().all(|all| all.iter().all(in_bucket)), "its buckets are others")?;
-        let refers = piece.outside.iter().all(is_point)
+        let refers = piece.outside.iter().all(is_any)
             && piece.moved.windows(2).all(|pair| pair[0].0 < pair[1].0)
             && piece.moved.iter().all(|(v, place)| is_point(v) && place.iter().all(|x| x.is_finite()))
             && piece.shared.iter().all(|(v, first, last)| is_point(v) && first <= last)

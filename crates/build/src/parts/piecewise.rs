@@ -447,7 +447,7 @@ impl<'a> Piecewise<'a> {
         let [low, high] = [bounds.min, bounds.max].map(|p| of.lattice.nearest(p));
         let sides = [0, 1, 2].map(|k| high[k] - low[k]);
         let whole = (self.parts, checksum.finalize(), sides);
-        Ok(Plan::new(&info, self.config, self.purpose, whole, None, metadata))
+        Ok(Plan::new(&info, self.config, self.purpose, whole, (None, &[]), metadata))
     }
 
     /// Sorts all pieces into the parts.

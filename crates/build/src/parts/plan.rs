@@ -81,6 +81,8 @@ pub(super) struct PlanField {
     averaged: Option<(PlanExtremes, [f64; 2])>,
     /// Whether its exact values are kept.
     pub lossless: bool,
+    /// Whether it has a value for each region.
+    pub jumps: bool,
 }
 
 /// The smallest and the largest value: each with its place, and the number and the part of its cell.
@@ -101,7 +103,7 @@ fn extremes_of(stored: &PlanExtremes) -> Extremes {
 }
 
 impl PlanField {
-    pub fn new(field: &FieldInfo, lossless: bool) -> Self {
+    pub fn new(field: &FieldInfo, lossless: bool, jumps: bool) -> Self {
         Self {
             name: field.name.clone(),
             range: [field.min, field.max],
@@ -115,6 +117,7 @@ impl PlanField {
                 (of_extremes(input), [difference.rms, difference.largest])
             }),
             lossless,
+            jumps,
         }
     }
 
@@ -178,12 +181,15 @@ impl Plan {
         config: &BuildConfig,
         purpose: Purpose,
         (parts, input, sides): (u32, u32, [i32; 3]),
-        regions: Option<PlanRegions>,
+        (regions, jumps): (Option<PlanRegions>, &[bool]),
         metadata: BTreeMap<String, String>,
     ) -> Self {
         let is_lossless = |field: &FieldInfo| {
             let of_vector = |name: &String| field.vector.as_ref().is_some_and(|vector| vector.name == *name);
             config.all_lossless || config.lossless.iter().any(|name| field.name == *name || of_vector(name))
+        };
+        let field = |(f, field): (usize, &FieldInfo)| {
+            PlanField::new(field, is_lossless(field), jumps.get(f).is_some_and(|jumps| *jumps))
         };
         let Lattice { origin, step, bits } = info.lattice;
         Self {
@@ -191,7 +197,7 @@ impl Plan {
             input,
             lattice: (origin, step, bits),
             sides,
-            fields: info.fields.iter().map(|field| PlanField::new(field, is_lossless(field))).collect(),
+            fields: info.fields.iter().enumerate().map(field).collect(),
             counts: [info.vertices, info.tetrahedra],
             displacement_per_error: info.displacement_per_error,
             displacement_edges: config.displacement_edges,
@@ -202,6 +208,17 @@ impl Plan {
             block_bits: config.block_bits.clamp(4, 16),
             metadata,
         }
+    }
+
+    /// For each field whether it has a value for each region; empty if none does.
+    pub(super) fn jumps(&self) -> Vec<bool> {
+        let jumps: Vec<bool> = self.fields.iter().map(|field| field.jumps).collect();
+        if jumps.contains(&true) { jumps } else { Vec::new() }
+    }
+
+    /// How many regions are kept apart.
+    pub(super) fn region_count(&self) -> u32 {
+        self.regions.as_ref().map_or(0, |regions| regions.all.len() as u32)
     }
 
     /// How many parts there are.

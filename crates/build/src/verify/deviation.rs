@@ -22,7 +22,7 @@ pub struct Deviation<'a> {
     /// With a point for each region where fields jump.
     input: Cow<'a, TetMesh>,
     /// The tetrahedra without these.
-    joined: &'a [[u32; 4]],
+    joined: Cow<'a, [[u32; 4]]>,
     /// The region of each point where fields jump; else empty.
     regions: Vec<u16>,
     /// Whether interfaces may have moved: then a point may be in another region.
@@ -83,19 +83,17 @@ impl<'a> Deviation<'a> {
             tetralod::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
         let faces = boundary_faces(&input.tets, &neighbors).map(|(_, face)| face).collect();
         drop(neighbors);
-        Self::of(info, regions, input, faces, vertices)
+        Self::of(info, split(input, regions)?, faces, vertices)
     }
 
     /// Prepares to compare with what the input has in some place, given the faces of its boundary there.
     pub fn of(
         info: &'a MtInfo,
-        regions: Option<&Regions>,
-        input: &'a TetMesh,
+        input: Split<'a>,
         faces: Vec<[u32; 3]>,
         vertices: usize,
     ) -> Result<Self, String> {
-        let joined = &input.tets[..];
-        let Split { mesh: input, regions: of_points } = split(input, regions)?;
+        let Split { mesh: input, joined, regions, may_move } = input;
         let points = input.positions.len();
         let mut fields = Vec::new();
         for field in &info.fields {
@@ -109,7 +107,7 @@ impl<'a> Deviation<'a> {
             input.positions.iter().map(|p| (DVec3::from(*p) - origin) / step).collect();
         // Beside where the lattice has put a vertex of an interface there may be another region.
         for ((place, position), _) in
-            places.iter_mut().zip(&positions).zip(&of_points).filter(|(_, (_, several))| *several)
+            places.iter_mut().zip(&positions).zip(&regions).filter(|(_, (_, several))| *several)
         {
             *place = DVec3::from_array(position.map(f64::from));
         }
@@ -121,8 +119,8 @@ impl<'a> Deviation<'a> {
         Ok(Self {
             info,
             joined,
-            regions: of_points.into_iter().map(|(region, _)| region).collect(),
-            may_move: regions.is_some_and(|regions| regions.deviation > 0.0),
+            regions: regions.into_iter().map(|(region, _)| region).collect(),
+            may_move,
             input,
             points: PointGrid::new(positions),
             places,
@@ -143,9 +141,8 @@ impl<'a> Deviation<'a> {
 
     /// The input on the lattice with one vertex for all regions that meet there.
     pub fn joined(&self) -> PlainReference<'_> {
-        let [points, tets] = [self.info.vertices as usize, self.joined.len()];
-        let points = if tets == 0 { self.points.points().len() } else { points };
-        PlainReference { positions: &self.points.points()[..points], levels: &self.levels, tets: self.joined }
+        let positions = &self.points.points()[..self.info.vertices as usize];
+        PlainReference { positions, levels: &self.levels, tets: &self.joined }
     }
 
     /// Whether a tetrahedron is of the region of a point.

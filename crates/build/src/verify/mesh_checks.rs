@@ -94,17 +94,22 @@ impl<'a> PlainMesh<'a> {
     pub fn check(&self, reference: &Shape) -> Result<(), String> {
         self.check_vertices()?;
         self.check_orientation()?;
+        let shape = self.shape()?;
+        if shape != *reference {
+            return Err(format!("the topology has changed: {shape}; of the input: {reference}"));
+        }
+        Ok(())
+    }
+
+    /// The topology, if adjacency is right.
+    pub fn shape(&self) -> Result<Shape, String> {
         let mut around = Around::new(self.positions.len(), self.joined)?;
         let (mut faces, mut count) = (Vec::new(), Counts::new(self.tets.len()));
         for v in 0..self.positions.len() as u32 {
             count.add(v, around.at(v, &mut faces), &faces);
             self.check_faces(&faces)?;
         }
-        let shape = count.shape(self.count_joined()?, self.tets.len())?;
-        if shape != *reference {
-            return Err(format!("the topology has changed: {shape}; of the input: {reference}"));
-        }
-        Ok(())
+        count.shape(self.count_joined()?, self.tets.len())
     }
 
     fn check_vertices(&self) -> Result<(), String> {

@@ -2,10 +2,12 @@
 
 use super::deviation::{Deviation, check_counts};
 use super::history::Numbers;
-use super::mesh_checks::{PlainMesh, PlainReference, Shape};
+use super::mesh_checks::PlainMesh;
 use super::queries::Query;
 use super::regions::KeptRegions;
+use super::split::{Split, split};
 use super::{Case, VerifyReport, fresh, note, satisfy};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use tetralod::geom::{Bounds, LatticeBox, tet_meets_box};
 use tetralod::mesh::{FACES, Field, Grid, NONE, TetMesh, boundary_faces, kuhn_tets, neighbors};
@@ -69,11 +71,7 @@ fn check<M: ApplyUpdates>(
 ) -> Result<(), String> {
     let info = mt.info();
     check_counts(info, input)?;
-    if mt.regions().is_some_and(|regions| !regions.sides.jumps.is_empty()) {
-        return Err(
-            "fields have values for each region: verify the file as a whole, without samples".to_owned()
-        );
-    }
+    let split = split(input, mt.regions())?;
     let around = match &query.request.needs[..] {
         [need] => region(need).map(|inside| (inside, need)),
         _ => None,
@@ -83,15 +81,15 @@ fn check<M: ApplyUpdates>(
         Some((inside, need)) => {
             let away = need.error.min(1.0) * info.displacement_per_error;
             let wide = Bounds { min: inside.min.map(|x| x - away), max: inside.max.map(|x| x + away) };
-            Near::of(input, &wide)?
+            Near::of(&split, &wide)?
         }
-        None => Near::sparse(input)?,
+        None => Near::sparse(&split)?,
     };
-    let mut deviation = Deviation::of(info, None, &near.mesh, near.faces, most)?;
+    drop(split);
+    let mut deviation = Deviation::of(info, near.split(), near.faces.clone(), most)?;
     let base = fresh(mt)?;
     let plain = PlainMesh::of(base.mesh());
-    let shape = Shape::of(&PlainReference { positions: plain.positions, levels: &[], tets: plain.tets })
-        .map_err(|failure| format!("the base mesh: {failure}"))?;
+    let shape = plain.shape().map_err(|failure| format!("the base mesh: {failure}"))?;
     let mut front = base.clone();
     let outcome = satisfy(mt, &mut front, query)?;
     if outcome.missing {
@@ -135,15 +133,37 @@ struct Near {
     mesh: TetMesh,
     /// The faces of the mesh that are of the domain's boundary.
     faces: Vec<[u32; 3]>,
+    /// As in [`Split`].
+    regions: Vec<(u16, bool)>,
+    may_move: bool,
 }
 
 impl Near {
     /// All tetrahedra whose bounding boxes meet a box.
-    fn of(input: &TetMesh, inside: &Bounds) -> Result<Self, String> {
-        match input.grid.filter(|_| input.is_grid_alone()) {
-            Some(grid) => Self::of_grid(input, &grid, inside),
+    fn of(input: &Split<'_>, inside: &Bounds) -> Result<Self, String> {
+        match input.mesh.grid.filter(|_| input.mesh.is_grid_alone()) {
+            Some(grid) => Self::of_grid(&input.mesh, &grid, inside),
             None => Self::of_mesh(input, inside),
         }
+    }
+
+    /// These points of an input, with tetrahedra and faces by their numbers here.
+    fn points(
+        input: &Split<'_>,
+        taken: &[usize],
+        tets: Vec<[u32; 4]>,
+        faces: Vec<[u32; 3]>,
+    ) -> Result<Self, String> {
+        let positions = taken.iter().map(|&v| input.mesh.positions[v]).collect();
+        let mesh = TetMesh { positions, tets, fields: values(&input.mesh, taken)?, ..TetMesh::default() };
+        let regions = taken.iter().filter_map(|&v| input.regions.get(v).copied()).collect();
+        Ok(Self { mesh, faces, regions, may_move: input.may_move })
+    }
+
+    /// What errors are measured against: no one asks for the topology of it.
+    fn split(&self) -> Split<'_> {
+        let (mesh, joined) = (Cow::Borrowed(&self.mesh), Cow::Borrowed(&self.mesh.tets[..]));
+        Split { mesh, joined, regions: self.regions.clone(), may_move: self.may_move }
     }
 
     fn of_grid(input: &TetMesh, grid: &Grid, inside: &Bounds) -> Result<Self, String> {
@@ -175,13 +195,14 @@ impl Near {
             })
         };
         let faces = boundary_faces(&mesh.tets, &across).map(|(_, face)| face).filter(is_side).collect();
-        Ok(Self { mesh, faces })
+        Ok(Self { mesh, faces, regions: Vec::new(), may_move: false })
     }
 
-    fn of_mesh(input: &TetMesh, inside: &Bounds) -> Result<Self, String> {
+    fn of_mesh(input: &Split<'_>, inside: &Bounds) -> Result<Self, String> {
+        let Split { mesh, joined: all, .. } = input;
         let meets = |tet: &[u32; 4]| {
             (0..3).all(|k| {
-                let x = tet.map(|v| input.positions[v as usize][k]);
+                let x = tet.map(|v| mesh.positions[v as usize][k]);
                 let [low, high] = [
                     x.iter().copied().fold(f64::INFINITY, f64::min),
                     x.iter().copied().fold(f64::NEG_INFINITY, f64::max),
@@ -189,28 +210,30 @@ impl Near {
                 low <= inside.max[k] && high >= inside.min[k]
             })
         };
-        let mut local = vec![NONE; input.positions.len()];
+        let mut local = vec![NONE; mesh.positions.len()];
         let mut taken = Vec::new();
-        let mut tets = Vec::new();
-        for tet in input.tets.iter().filter(|tet| meets(tet)) {
-            tets.push(tet.map(|v| {
-                let number = &mut local[v as usize];
-                if *number == NONE {
-                    *number = taken.len() as u32;
-                    taken.push(v as usize);
-                }
-                *number
-            }));
+        let mut number = |v: u32| {
+            let number = &mut local[v as usize];
+            if *number == NONE {
+                *number = taken.len() as u32;
+                taken.push(v as usize);
+            }
+            *number
+        };
+        let (mut tets, mut joined) = (Vec::new(), Vec::new());
+        for (tet, with_shared) in mesh.tets.iter().zip(&**all).filter(|(tet, _)| meets(tet)) {
+            tets.push(tet.map(&mut number));
+            joined.push(with_shared.map(&mut number));
         }
-        let across = neighbors(&tets).map_err(|error| format!("the input: {error}"))?;
+        let across = neighbors(&joined).map_err(|error| format!("the input: {error}"))?;
         let sorted = |mut face: [u32; 3]| {
             face.sort_unstable();
             face
         };
         let mut faces: BTreeSet<[u32; 3]> =
-            boundary_faces(&tets, &across).map(|(_, face)| sorted(face)).collect();
+            boundary_faces(&joined, &across).map(|(_, face)| sorted(face)).collect();
         // Some of these have a tetrahedron behind them that was not taken.
-        for tet in input.tets.iter().filter(|tet| !meets(tet)) {
+        for tet in all.iter().filter(|tet| !meets(tet)) {
             let corners = tet.map(|v| local[v as usize]);
             for face in FACES.map(|face| face.map(|k| corners[k])) {
                 if !face.contains(&NONE) {
@@ -218,28 +241,24 @@ impl Near {
                 }
             }
         }
-        let positions = taken.iter().map(|&v| input.positions[v]).collect();
-        let mesh = TetMesh { positions, tets, fields: values(input, &taken)?, ..TetMesh::default() };
-        Ok(Self { mesh, faces: faces.into_iter().collect() })
+        Self::points(input, &taken, tets, faces.into_iter().collect())
     }
 
     /// Some points from all over the domain, and its boundary, without tetrahedra.
-    fn sparse(input: &TetMesh) -> Result<Self, String> {
+    fn sparse(split: &Split<'_>) -> Result<Self, String> {
+        let Split { mesh: input, joined, .. } = split;
         let [points, _] = input.counts();
         let stride = (points as usize).div_ceil(VERTICES).max(1);
         let mut taken: Vec<usize> = (0..points as usize).step_by(stride).collect();
         let Some(grid) = input.grid.filter(|_| input.is_grid_alone()) else {
-            let across = neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
-            let mut faces: Vec<[u32; 3]> =
-                boundary_faces(&input.tets, &across).map(|(_, face)| face).collect();
+            let across = neighbors(joined).map_err(|error| format!("the input: {error}"))?;
+            let mut faces: Vec<[u32; 3]> = boundary_faces(joined, &across).map(|(_, face)| face).collect();
             taken.extend(faces.iter().flatten().map(|&v| v as usize));
             taken.sort_unstable();
             taken.dedup();
             let number = |v: u32| taken.partition_point(|&other| other < v as usize) as u32;
             faces.iter_mut().for_each(|face| *face = face.map(number));
-            let positions = taken.iter().map(|&v| input.positions[v]).collect();
-            let mesh = TetMesh { positions, fields: values(input, &taken)?, ..TetMesh::default() };
-            return Ok(Self { mesh, faces });
+            return Self::points(split, &taken, Vec::new(), faces);
         };
         // The boundary of a grid is that of its box.
         let [nx, ny, nz] = grid.dims.map(|n| n as usize);
@@ -254,7 +273,7 @@ impl Near {
         let faces = boundary_faces(&cube, &across).map(|(_, face)| face.map(|v| first + v)).collect();
         let positions = indices.iter().map(|index| grid.point(index.map(|i| i as u32))).collect();
         let mesh = TetMesh { positions, fields: values(input, &taken)?, ..TetMesh::default() };
-        Ok(Self { mesh, faces })
+        Ok(Self { mesh, faces, regions: Vec::new(), may_move: false })
     }
 }
 

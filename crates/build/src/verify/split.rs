@@ -8,14 +8,19 @@ use tetralod::mt::Regions;
 /// The input as the meshes of an MT have it.
 pub struct Split<'a> {
     pub mesh: Cow<'a, TetMesh>,
+    /// Its tetrahedra with one vertex for all regions that meet there: the first of these points.
+    pub joined: Cow<'a, [[u32; 4]]>,
     /// The region of each point, and whether others meet there; empty where no field jumps.
     pub regions: Vec<(u16, bool)>,
+    /// Whether interfaces may have moved: then a point may be in another region.
+    pub may_move: bool,
 }
 
 /// Splits the points of an input at which regions of an MT meet, if any of its fields jumps there.
 pub fn split<'a>(input: &'a TetMesh, regions: Option<&Regions>) -> Result<Split<'a>, String> {
     let Some(regions) = regions.filter(|regions| !regions.sides.jumps.is_empty()) else {
-        return Ok(Split { mesh: Cow::Borrowed(input), regions: Vec::new() });
+        let (mesh, joined) = (Cow::Borrowed(input), Cow::Borrowed(&input.tets[..]));
+        return Ok(Split { mesh, joined, regions: Vec::new(), may_move: false });
     };
     if input.sides.is_empty() {
         return Err("the input has no values for each region: average its fields at cells so".to_owned());
@@ -56,5 +61,7 @@ pub fn split<'a>(input: &'a TetMesh, regions: Option<&Regions>) -> Result<Split<
         }
     }
     mesh.sides = Vec::new();
-    Ok(Split { mesh: Cow::Owned(mesh), regions: of_points })
+    let (mesh, joined, may_move) =
+        (Cow::Owned(mesh), Cow::Borrowed(&input.tets[..]), regions.deviation > 0.0);
+    Ok(Split { mesh, joined, regions: of_points, may_move })
 }
