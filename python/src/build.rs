@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::Coded;
 use tetralod::format::{EncodeOptions, encode};
-use tetralod::mesh::{self, CellsToPoints, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh};
+use tetralod::mesh::{self, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh};
 use tetralod::mt::{AveragedField, MtKind};
 use tetralod_build::{
     BuildConfig, BuildCriterion, BuildError, BuildSummary, Construction, ConstructionChoice, FieldPrecision,
@@ -128,10 +128,7 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
         let (level, weld_distance) = (level.name(), level.weld_distance());
         (mesh, done.to_string(), Some(Repair { level, weld_distance, done, kept: found.to_string(), found }))
     };
-    let to_points = match options.cell_to_point {
-        true => config.cells_to_points(options.mean_across_regions),
-        false => CellsToPoints::No,
-    };
+    let to_points = config.cells_to_points(options.cell_to_point, options.mean_across_regions);
     mesh.settle_cells(to_points, &config.preserve);
     mesh.add_geometry_fields(&config.fields);
     let unknown = |(name, _): &(String, String)| {

@@ -14,7 +14,7 @@ use super::payload::histogram::Histograms;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::section::Section;
 use super::{EncodeError, EncodeOptions, checksum, payload};
-use crate::mt::{Exact, Mt, VertexId};
+use crate::mt::{Exact, Mt, Regions, VertexId};
 use std::collections::BTreeMap;
 use std::io;
 
@@ -64,7 +64,7 @@ fn encode_kind<C: Codec>(
     put(&header(Start {
         total: Some(total),
         tet_errors: mt.has_tet_errors(),
-        sides: mt.regions().is_some_and(|regions| !regions.sides.jumps.is_empty()),
+        sides: mt.regions().is_some_and(Regions::has_sides),
         exact: !has_index && !exact.is_empty(),
     }))?;
     for section in sections.iter().chain([&end]) {

@@ -66,16 +66,9 @@ impl TetMesh {
     }
 
     /// As [`TetMesh::cells_to_points`], but for each region apart: a point at which several regions meet gets a value for each of them, the
-    /// mean of the cells around it in that region. Regions are told apart by the arrays `labels`, at cells, or at points, of which the least
-    /// of a tetrahedron counts. In a point's first region, by the labels in ascending order, its value is in [`Field::values`], in each
-    /// further one, in [`Field::sides`]. To be called once the mesh is sound: what changes its points or tetrahedra knows nothing of sides.
-    pub fn cells_to_points_by_region(&mut self, labels: &[String]) {
-        let is_label = |field: &&Field| labels.contains(&field.name);
-        let kept: Vec<Field> = self.cell_fields.iter().filter(is_label).cloned().collect();
-        self.average_cells(&kept, labels);
-    }
-
-    /// Turns fields at cells into fields at points, for each region by these labels, some of which are not among the fields of the mesh.
+    /// mean of the cells around it in that region. Regions are told apart by the arrays `labels`, at cells, which may be among `own`, or at
+    /// points, of which the least of a tetrahedron counts. In a point's first region, by the labels in ascending order, its value is in
+    /// [`Field::values`], in each further one, in [`Field::sides`]. What changes points or tetrahedra afterwards knows nothing of sides.
     fn average_cells(&mut self, own: &[Field], labels: &[String]) {
         let (read, named) = std::mem::take(&mut self.cell_fields)
             .into_iter()

@@ -38,8 +38,7 @@ pub struct TetMesh {
     pub grid: Option<Grid>,
     /// Scalar fields at the cells, each as long as `tets`; without values where only their names were asked for.
     pub cell_fields: Vec<Field>,
-    /// Points at which several regions meet, for fields that have a value there for each of them: see
-    /// [`TetMesh::cells_to_points_by_region`].
+    /// Points at which several regions meet, for fields that have a value there for each of them: see [`Field::sides`].
     pub sides: Vec<Side>,
     /// What its reader left out of the file, or took in a way that the file does not state: in words, for users.
     pub notes: Vec<String>,

@@ -2,7 +2,7 @@
 
 use super::{
     ConvertError, EdgeMt, EdgeMtBuilder, ExplicitMt, HalfEdgeMt, MAX_STAR, Mt, MtKind, MultiTessellation,
-    ReplayError, UpdateError, UpdateId, VertexId, VertexMt, VertexSplit,
+    Regions, ReplayError, UpdateError, UpdateId, VertexId, VertexMt, VertexSplit,
 };
 use crate::mt::replay::canonical;
 
@@ -15,9 +15,7 @@ impl Mt {
         let from = self.info().kind;
         match (from, to) {
             _ if from == to => Ok(self.clone()),
-            _ if self.regions().is_some_and(|regions| !regions.sides.jumps.is_empty()) => {
-                Err(ConvertError::Sides { to })
-            }
+            _ if self.regions().is_some_and(Regions::has_sides) => Err(ConvertError::Sides { to }),
             // Both are made of vertex insertions.
             (MtKind::Vertex, MtKind::HalfEdge) | (MtKind::HalfEdge, MtKind::Vertex) => {
                 ExplicitMt::of(self)?.compact(to)

@@ -95,6 +95,12 @@ fn unknown(name: &str, all: &[RegionInfo]) -> String {
 }
 
 impl Regions {
+    /// Whether vertices may have a value for each region, in some field.
+    #[doc(hidden)]
+    pub fn has_sides(&self) -> bool {
+        !self.sides.jumps.is_empty()
+    }
+
     /// The colour of each: its place in the palette.
     pub fn colors(&self) -> Vec<u8> {
         self.all.iter().map(|region| region.color).collect()

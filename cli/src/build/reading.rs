@@ -7,7 +7,7 @@ use crate::parts::InPieces;
 use crate::repair::Repair;
 use crate::{files, input};
 use anyhow::{Result, anyhow};
-use tetralod::mesh::{CellsToPoints, GeometryField, RepairLevel, RepairReport, TetMesh};
+use tetralod::mesh::{GeometryField, RepairLevel, RepairReport, TetMesh};
 use tetralod_build::BuildConfig;
 use tetralod_build::parts::PartsError;
 use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
@@ -55,10 +55,7 @@ impl BuildOptions {
         input::expect_format(&self.inputs, self.format.as_deref());
         let source = input::Source { format: self.format.as_deref(), step: self.step, memory };
         let (mut mesh, repaired) = input::read_cells(&self.inputs, &wanted, level, source, alone)?;
-        let to_points = match self.cell_to_point {
-            true => config.cells_to_points(self.mean_across_regions),
-            false => CellsToPoints::No,
-        };
+        let to_points = config.cells_to_points(self.cell_to_point, self.mean_across_regions);
         mesh.settle_cells(to_points, &config.preserve);
         mesh.add_geometry_fields(&config.fields);
         if config.construction.method().keeps_the_mesh() {

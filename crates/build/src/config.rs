@@ -87,12 +87,16 @@ impl BuildConfig {
         }
     }
 
-    /// What fields at cells become where they become fields at points, unless they are to be averaged across regions: for each region apart
-    /// if there are any, and the kind can keep that.
+    /// What fields at cells become if they are to become fields at points, and unless they are to be averaged across regions: for each region
+    /// apart if there are any, and the kind can keep that.
     #[doc(hidden)]
-    pub fn cells_to_points(&self, across_regions: bool) -> CellsToPoints {
+    pub fn cells_to_points(&self, to_points: bool, across_regions: bool) -> CellsToPoints {
         let keeps_sides = self.construction.kind() == MtKind::HalfEdge && !self.preserve.is_empty();
-        if keeps_sides && !across_regions { CellsToPoints::ByRegion } else { CellsToPoints::AcrossRegions }
+        match (to_points, keeps_sides && !across_regions) {
+            (false, _) => CellsToPoints::No,
+            (true, false) => CellsToPoints::AcrossRegions,
+            (true, true) => CellsToPoints::ByRegion,
+        }
     }
 }
 

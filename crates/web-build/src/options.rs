@@ -116,10 +116,7 @@ fn read(given: &Given, construction: Construction, default: BuildConfig) -> Resu
         return Err(given.refuse("metadata", &format!("the key \"{key}\" is empty or reserved")));
     }
     let (cells, repair) = (given.answer("cellToPoint")?, repair(given)?);
-    let to_points = match (given.answer("meanAcrossRegions")?, cells) {
-        (_, false) => CellsToPoints::No,
-        (across, true) => config.cells_to_points(across),
-    };
+    let to_points = config.cells_to_points(cells, given.answer("meanAcrossRegions")?);
     Ok(BuildOptions { config, cells, to_points, repair, units: pairs(given, "units")?, metadata })
 }
 

@@ -43,7 +43,7 @@ pub fn put_base_field(out: &mut impl Put, mt: &impl Codec, field: usize) {
         out.signed(BASE_LEVEL, 0, level - last);
         last = level;
     }
-    let jumping = mt.regions().map(|regions| &regions.sides).filter(|sides| !sides.jumps.is_empty());
+    let jumping = mt.regions().filter(|regions| regions.has_sides()).map(|regions| &regions.sides);
     if let Some(sides) = jumping.filter(|sides| sides.jumps[field]) {
         half_edge::put_base_sides(out, &sides.levels, sides.jumps.len(), field);
     }

@@ -110,7 +110,7 @@ fn regions_of(mt: &impl ApplyUpdates) -> Result<(Vec<u16>, Sides), ReplayError> 
     let mut all = regions.of_base.clone();
     let mut sides = Sides::default();
     let mut mesh = mt.start()?;
-    let jumps = !regions.sides.jumps.is_empty();
+    let jumps = regions.has_sides();
     let mut note = |mesh: &CurrentMesh, t: u32| {
         for slot in mesh.tet(t).into_iter().flatten().filter(|_| jumps) {
             let key = (mesh.vertex(slot).0, mesh.regions()[t as usize]);

@@ -18,7 +18,7 @@ pub struct Split<'a> {
 
 /// Splits the points of an input at which regions of an MT meet, if any of its fields jumps there.
 pub fn split<'a>(input: &'a TetMesh, regions: Option<&Regions>) -> Result<Split<'a>, String> {
-    let Some(regions) = regions.filter(|regions| !regions.sides.jumps.is_empty()) else {
+    let Some(regions) = regions.filter(|regions| regions.has_sides()) else {
         let (mesh, joined) = (Cow::Borrowed(input), Cow::Borrowed(&input.tets[..]));
         return Ok(Split { mesh, joined, regions: Vec::new(), may_move: false });
     };
