@@ -2,17 +2,21 @@
 //! crate gives it.
 
 use crate::reader;
-use crate::reader::half_edge_mesh::Mesh;
+use crate::reader::half_edge_mesh::{Marked, Mesh};
 use crate::support::files::{assemble, decode, sections};
 use crate::support::meshes::{blocks, hilly};
 use std::collections::BTreeMap;
 use tetralod::format::{EncodeOptions, FormatError, encode};
-use tetralod::mesh::{Field, TetMesh};
+use tetralod::mesh::{CellsToPoints, Field, TetMesh};
 use tetralod::mt::{Applied, ApplyUpdates, CurrentMesh, Mt, MultiTessellation, UpdateId};
 use tetralod_build::{BuildConfig, build};
 
 /// Three slabs and in the middle one a column, with labels that are no numbers from 0 on, by two arrays.
 fn labelled(within: f64) -> Mt {
+    built(labelled_mesh(), within)
+}
+
+fn labelled_mesh() -> TetMesh {
     let mut mesh = blocks([6, 5, 6], &[hilly], |_| true);
     let middle = |tet: &[u32; 4]| {
         let corners = tet.map(|v| mesh.positions[v as usize]);
@@ -25,8 +29,12 @@ fn labelled(within: f64) -> Mt {
     let labels: Vec<[f64; 2]> = mesh.tets.iter().map(|tet| label(middle(tet))).collect();
     let array = |k: usize, name: &str| Field::new(name, labels.iter().map(|all| all[k]).collect());
     mesh.cell_fields = vec![array(0, "material"), array(1, "slab")];
-    let mesh = TetMesh { grid: None, ..mesh };
+    TetMesh { grid: None, ..mesh }
+}
+
+fn built(mesh: TetMesh, within: f64) -> Mt {
     let config = BuildConfig {
+        all_fields: true,
         preserve: vec!["material".into(), "slab".into()],
         preserve_within: within,
         block_bits: 4,
@@ -93,6 +101,69 @@ fn a_second_reader_finds_the_same_regions_in_every_mesh() {
             assert_eq!(mt.coarsen(&mut ours, u), Ok(Applied::Done));
         }
         assert_eq!(of_crate(&ours), of_crate(&mt.start().expect("a valid base mesh")));
+    }
+}
+
+/// The levels of each corner of each tetrahedron, by its vertices.
+type AtCorners = BTreeMap<[u32; 4], Vec<Vec<i32>>>;
+
+#[test]
+fn a_second_reader_finds_the_values_of_each_region() {
+    for within in [0.0, 0.05] {
+        let mut mesh = labelled_mesh();
+        let own =
+            |label: f64, t: usize| 0.01 * label + ((t * t) % 17) as f64 * if label < 0.0 { 0.3 } else { 0.0 };
+        let stress = mesh.cell_fields[0].values.iter().enumerate().map(|(t, &label)| own(label, t)).collect();
+        mesh.cell_fields.push(Field::new("stress", stress));
+        mesh.settle_cells(CellsToPoints::ByRegion, &["material".into(), "slab".into()]);
+        let mt = built(mesh, within);
+        let bytes = written(&mt);
+        let (file, parts) = reader::open(&bytes);
+        let regions = file.regions.as_ref().expect("the section");
+        assert_eq!(regions.jumps, mt.regions().expect("regions").sides.jumps);
+        assert!(regions.jumps.contains(&true) && regions.jumps.contains(&false));
+        assert!(file.base_sides.iter().any(|own| !own.is_empty()));
+        let of_reader = |mesh: &Mesh<'_>| -> AtCorners {
+            let of = |marked: &Marked| {
+                let tet = sorted(marked.tet);
+                (tet, tet.map(|v| mesh.vertices[&v].levels_in(marked.region).to_vec()).to_vec())
+            };
+            mesh.tets.iter().map(of).collect()
+        };
+        let of_crate = |mesh: &CurrentMesh| -> AtCorners {
+            let of = |t: u32| {
+                let mut corners = mesh.tet(t)?.map(|v| (mesh.vertex(v).0, mesh.levels(v).to_vec()));
+                corners.sort_unstable();
+                Some((corners.each_ref().map(|(v, _)| *v), corners.map(|(_, levels)| levels).to_vec()))
+            };
+            (0..mesh.tet_slots() as u32).filter_map(of).collect()
+        };
+        let mut theirs = Mesh::new(&file);
+        let mut ours = mt.start().expect("a valid base mesh");
+        assert!(of_reader(&theirs) == of_crate(&ours), "the base mesh");
+        let mut several = 0;
+        for block in 0..parts.len() as u32 {
+            let records = reader::half_edge::block(&file, block, &parts[block as usize]);
+            several += records.iter().flat_map(|record| &record.sides).filter(|own| !own.is_empty()).count();
+            theirs.add_block(records);
+            let entry = &file.index.as_ref().expect("an index").blocks[block as usize];
+            for k in file.updates(block) {
+                let change = theirs.apply(k);
+                assert_eq!(mt.refine(&mut ours, UpdateId(k)), Ok(Applied::Done));
+                // The index knows of all regions.
+                let is_new = |marked: &&Marked| change.inserted.contains(&marked.tet);
+                for Marked { tet, region, .. } in theirs.tets.iter().filter(is_new) {
+                    for v in tet {
+                        let levels = theirs.vertices[v].levels_in(*region).iter();
+                        for (&level, (_, [low, high])) in levels.zip(&entry.fields) {
+                            assert!((*low..=*high).contains(&(level as u64)));
+                        }
+                    }
+                }
+            }
+            assert!(of_reader(&theirs) == of_crate(&ours), "after block {block}, within {within}");
+        }
+        assert!(several > 20, "{several}");
     }
 }
 

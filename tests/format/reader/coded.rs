@@ -104,6 +104,9 @@ pub const STAR_BITS: Row = numbers(166, 1, 4);
 pub const STAR_BIT: Row = symbols(167, 64, 2);
 pub const HALF_EDGE_ERROR: Row = symbols(231, 16, 256);
 pub const HALF_EDGE_LEVEL: Row = numbers(247, 128, 1);
+/// In files with flag 1.
+pub const HALF_EDGE_SIDES: Row = numbers(375, 2, 2);
+pub const HALF_EDGE_SIDE: Row = numbers(377, 2, 1);
 
 const OF_ALL: [Row; 10] =
     [BEHIND, SEED, LENGTH, STEP, RANK, BASE_LEVEL, VALUE_GAP, VALUE_BITS, QUARTERS, OWN_FALL];
@@ -111,7 +114,7 @@ const OF_SPLITS: [Row; 10] = [GAP, RUN, CHILDREN, RISE, EDGE, OFFSET, LAST_WRONG
 const OF_INSERTIONS: [Row; 9] =
     [FALL, FAN, DISTANCE, SEED_PLACE, GROW, GIVEN_UP, FAR, SHORT, INSERTION_LEVEL];
 
-const OF_HALF_EDGES: [Row; 13] = [
+const OF_HALF_EDGES: [Row; 15] = [
     REMOVER,
     BASE_INNER,
     FOREST_CHILDREN,
@@ -125,6 +128,8 @@ const OF_HALF_EDGES: [Row; 13] = [
     STAR_BIT,
     HALF_EDGE_ERROR,
     HALF_EDGE_LEVEL,
+    HALF_EDGE_SIDES,
+    HALF_EDGE_SIDE,
 ];
 
 /// Symbols with their shares.

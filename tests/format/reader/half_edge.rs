@@ -1,13 +1,15 @@
 //! Blocks of half-edge insertions, read by themselves: lists of children and codes of stars.
 
-use super::change::Point;
+use super::change::{Point, Tet};
 use super::coded::{
-    BASE_INNER, CHILD_GAP, CHILD_OFFSET, Coded, FOREST_CHILDREN, HALF_EDGE_ERROR, HALF_EDGE_LEVEL, NAMED,
-    NEW_BLOCK, REMOVER, STAR_BIT, STAR_BITS, STAR_SYMBOL, STAR_SYMBOLS, len,
+    BASE_INNER, CHILD_GAP, CHILD_OFFSET, Coded, FOREST_CHILDREN, HALF_EDGE_ERROR, HALF_EDGE_LEVEL,
+    HALF_EDGE_SIDE, HALF_EDGE_SIDES, NAMED, NEW_BLOCK, REMOVER, STAR_BIT, STAR_BITS, STAR_SYMBOL,
+    STAR_SYMBOLS, len,
 };
 use super::growth::Growth;
 use super::wire::{Bytes, Info};
 use super::{File, splits};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// A forest child of a vertex: an update, and where it inserts its vertex as seen from this one.
@@ -44,6 +46,8 @@ pub struct Record {
     /// By field.
     pub errors: Vec<u16>,
     pub residuals: Vec<i32>,
+    /// By field the residuals in further regions.
+    pub sides: Vec<Vec<i32>>,
 }
 
 /// What has been named so far in a section.
@@ -85,9 +89,16 @@ pub fn block(file: &File, block: u32, parts: &[Bytes<'_>]) -> Vec<Record> {
     });
     let mut records: Vec<Record> = records.collect();
     coded.end();
-    for part in &parts[1..] {
+    for (f, part) in parts[1..].iter().enumerate() {
         let mut coded = Coded::new(*part, &file.tables);
         let field = splits::field(&mut coded, updates.len(), [HALF_EDGE_ERROR, HALF_EDGE_LEVEL]);
+        let mut before = 0;
+        for record in &mut records {
+            let count = if file.jumps(f) { coded.number(HALF_EDGE_SIDES, before) } else { 0 };
+            assert!(count <= 127);
+            record.sides.push((0..count).map(|_| coded.signed(HALF_EDGE_SIDE, 0)).collect());
+            before = count.min(1);
+        }
         coded.end();
         for (record, (error, residual)) in records.iter_mut().zip(field) {
             record.errors.push(error);
@@ -95,6 +106,27 @@ pub fn block(file: &File, block: u32, parts: &[Bytes<'_>]) -> Vec<Record> {
         }
     }
     records
+}
+
+/// Each base vertex with its regions but the first, vertices and then regions ascending.
+pub fn further_regions(tets: &[Tet], of_tets: &[u16]) -> Vec<(u32, u16)> {
+    let mut regions: BTreeMap<u32, BTreeSet<u16>> = BTreeMap::new();
+    for (tet, region) in tets.iter().zip(of_tets) {
+        tet.iter().for_each(|&v| _ = regions.entry(v).or_default().insert(*region));
+    }
+    let further = |(v, own): (u32, BTreeSet<u16>)| own.into_iter().skip(1).map(move |region| (v, region));
+    regions.into_iter().flat_map(further).collect()
+}
+
+/// The levels of base vertices in these regions, in one field.
+pub fn base_sides(coded: &mut Coded<'_>, sides: &[(u32, u16)]) -> BTreeMap<(u32, u16), i32> {
+    assert_eq!(coded.number(HALF_EDGE_SIDES, 0) as usize, sides.len());
+    let mut level = 0;
+    let next = |&side: &(u32, u16)| {
+        level += coded.signed(HALF_EDGE_SIDE, 1);
+        (side, level)
+    };
+    sides.iter().map(next).collect()
 }
 
 /// The context of the `i`-th of `n` symbols or bits of a star.

@@ -4,7 +4,7 @@ use super::change::{Change, Point, Tet};
 use super::growth::volume;
 use super::half_edge::{Child, Mark, Record};
 use super::{File, half_edge_guess};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// A tetrahedron of the mesh.
 #[derive(Clone, Copy)]
@@ -20,7 +20,16 @@ pub struct Marked {
 pub struct Vertex {
     pub position: Point,
     pub levels: Vec<i32>,
+    /// By further region, then by field: those of fields that do not jump are `levels`.
+    pub sides: BTreeMap<u16, Vec<i32>>,
     pub children: Vec<Child>,
+}
+
+impl Vertex {
+    /// The levels in a region.
+    pub fn levels_in(&self, region: u16) -> &[i32] {
+        self.sides.get(&region).unwrap_or(&self.levels)
+    }
 }
 
 pub struct Mesh<'a> {
@@ -45,8 +54,14 @@ impl<'a> Mesh<'a> {
         let forest = file.forest.as_ref().expect("a file of kind 3");
         let vertices = (0..).zip(&file.base.positions).zip(&forest.children);
         let vertices = vertices.map(|((v, &position), children)| {
-            let levels = file.base_levels.iter().map(|levels| levels[v as usize]).collect();
-            (v, Vertex { position, levels, children: children.clone() })
+            let levels: Vec<i32> = file.base_levels.iter().map(|levels| levels[v as usize]).collect();
+            let mut sides: BTreeMap<u16, Vec<i32>> = BTreeMap::new();
+            for (f, own) in file.base_sides.iter().enumerate() {
+                for (&(_, region), &level) in own.range((v, 0)..=(v, u16::MAX)) {
+                    sides.entry(region).or_insert_with(|| levels.clone())[f] = level;
+                }
+            }
+            (v, Vertex { position, levels, sides, children: children.clone() })
         });
         let of = file.regions.as_ref().map(|regions| &regions.of_base);
         let tets = file.base.tets.iter().zip(&forest.marks).enumerate();
@@ -106,8 +121,9 @@ impl<'a> Mesh<'a> {
         let v = self.file.base.positions.len() as u32 + k;
         let (star, regions) = star(&removed, w, v);
         let record = self.records[&k].clone();
-        let levels = self.levels(&removed, position, &record.residuals);
-        let vertex = Vertex { position, levels: levels.clone(), children: record.children.clone() };
+        let (levels, sides) = self.levels(&removed, position, &record);
+        let children = record.children.clone();
+        let vertex = Vertex { position, levels: levels.clone(), sides, children };
         assert!(self.vertices.insert(v, vertex).is_none(), "applied twice");
         for tet in &star {
             assert!(volume(tet.map(|v| self.vertices[&v].position)) > 0, "{tet:?} is inside out");
@@ -126,8 +142,16 @@ impl<'a> Mesh<'a> {
         }
     }
 
-    fn levels(&self, removed: &[Marked], position: Point, residuals: &[i32]) -> Vec<i32> {
+    /// The levels of the new vertex of an update, and those in further regions.
+    fn levels(
+        &self,
+        removed: &[Marked],
+        position: Point,
+        record: &Record,
+    ) -> (Vec<i32>, BTreeMap<u16, Vec<i32>>) {
         let around: BTreeSet<u32> = removed.iter().flat_map(|marked| marked.tet).collect();
+        let regions: BTreeSet<u16> = removed.iter().map(|marked| marked.region).collect();
+        let first = *regions.first().expect("a region");
         let square = |v: &u32| {
             let p = self.vertices[v].position;
             let d = [0, 1, 2].map(|axis| i128::from(p[axis]) - i128::from(position[axis]));
@@ -135,15 +159,41 @@ impl<'a> Mesh<'a> {
         };
         let largest = around.iter().map(square).max().unwrap_or(0).max(1);
         let weight = |v: &u32| 256 * largest / square(v).max(1);
-        let all: i128 = around.iter().map(weight).sum();
-        let fields = residuals.iter().zip(&self.file.info.fields).enumerate();
-        let levels = fields.map(|(f, (residual, field))| {
-            let sum: i128 = around.iter().map(|v| weight(v) * i128::from(self.vertices[v].levels[f])).sum();
-            let level = (2 * sum + all).div_euclid(2 * all) as i32 + residual;
-            assert!((0..1 << field.bits).contains(&level));
+        let predicted = |f: usize, region: u16| {
+            let of_region = removed.iter().filter(|marked| marked.region == region);
+            let own: BTreeSet<u32> = match self.file.jumps(f) {
+                true => of_region.flat_map(|marked| marked.tet).collect(),
+                false => around.clone(),
+            };
+            let all: i128 = own.iter().map(weight).sum();
+            let level = |v: &u32| match self.file.jumps(f) {
+                true => self.vertices[v].levels_in(region)[f],
+                false => self.vertices[v].levels[f],
+            };
+            let sum: i128 = own.iter().map(|v| weight(v) * i128::from(level(v))).sum();
+            (2 * sum + all).div_euclid(2 * all) as i32
+        };
+        let on_lattice = |f: usize, level: i32| {
+            assert!((0..1 << self.file.info.fields[f].bits).contains(&level));
             level
+        };
+        let residuals = record.residuals.iter().enumerate();
+        let levels: Vec<i32> =
+            residuals.map(|(f, residual)| on_lattice(f, predicted(f, first) + residual)).collect();
+        let mut counts = record.sides.iter().enumerate().filter(|(f, _)| self.file.jumps(*f));
+        let count = counts.next().map_or(0, |(_, own)| own.len());
+        assert!(counts.all(|(_, own)| own.len() == count), "fields that jump have as many");
+        assert!(count == 0 || count == regions.len() - 1, "another number of regions");
+        let further = regions.iter().skip(1).take(count).enumerate();
+        let sides = further.map(|(i, &region)| {
+            let level = |(f, own): (usize, &Vec<i32>)| match own.get(i) {
+                Some(residual) => on_lattice(f, predicted(f, region) + residual),
+                None => levels[f],
+            };
+            (region, record.sides.iter().enumerate().map(level).collect())
         });
-        levels.collect()
+        let sides = sides.collect();
+        (levels, sides)
     }
 }
 

@@ -22,7 +22,7 @@ use growth::Growth;
 use half_edge::Forest;
 use insertions::Start;
 use splits::Split;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Range;
 use wire::{Bytes, Index, Info, Section};
 
@@ -48,6 +48,8 @@ pub struct File {
     pub forest: Option<Forest>,
     /// By field, then by vertex.
     pub base_levels: Vec<Vec<i32>>,
+    /// By field those of base vertices in further regions, if it jumps.
+    pub base_sides: Vec<BTreeMap<(u32, u16), i32>>,
     pub splits: HashMap<u32, Split>,
     /// In files of kind 0, for each block, by field, what no error of an update behind it is larger than.
     pub behind: Vec<Vec<u16>>,
@@ -84,7 +86,10 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         assert!(before < Some(at) && Some(at) < place(b"MODL"));
         wire::extremes(front[at].payload, &mut info);
     }
-    let regions = regions::find(front, &info, index.as_ref().map_or(0, |index| index.blocks.len()));
+    let has_sides = file[12] & 2 == 2;
+    let blocks = index.as_ref().map_or(0, |index| index.blocks.len());
+    let regions = regions::find(front, &info, blocks, has_sides);
+    assert!(!has_sides || info.kind == 3 && regions.is_some());
     let tables = coded::tables(next(b"MODL").payload, info.kind);
     let mut payload = next(b"BASE").payload;
     let [vertices, tets] = [payload.varint(), payload.varint()];
@@ -96,7 +101,10 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     let start = (info.kind == 1).then(|| insertions::start(&mut coded));
     let forest = (info.kind == 3).then(|| half_edge::forest(&mut coded, &info, block_bits, &base));
     coded.end();
-    let mut base_levels = Vec::new();
+    let jumps = |field: usize| regions.as_ref().is_some_and(|all| all.jumps.get(field) == Some(&true));
+    let of_base = regions.as_ref().map_or(&[][..], |regions| &regions.of_base);
+    let sides = half_edge::further_regions(&base.tets, of_base);
+    let (mut base_levels, mut base_sides) = (Vec::new(), Vec::new());
     for field in 0..info.fields.len() {
         let mut payload = next(b"FLDB").payload;
         assert_eq!(payload.varint() as usize, field);
@@ -107,6 +115,8 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
             level
         });
         base_levels.push(levels.collect());
+        let own = if jumps(field) { half_edge::base_sides(&mut coded, &sides) } else { BTreeMap::new() };
+        base_sides.push(own);
         coded.end();
     }
     let mut parts_of = Parts::new();
@@ -163,6 +173,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
             start,
             forest,
             base_levels,
+            base_sides,
             splits,
             behind: Vec::new(),
             exact,
@@ -224,6 +235,11 @@ fn check_end(end: &Section<'_>, front: &[Section<'_>], info: &Info) {
 }
 
 impl File {
+    /// Whether a field jumps between regions.
+    pub fn jumps(&self, field: usize) -> bool {
+        self.regions.as_ref().is_some_and(|regions| regions.jumps.get(field) == Some(&true))
+    }
+
     /// The block of an update.
     pub fn block_of(&self, k: u32) -> u32 {
         k >> self.block_bits

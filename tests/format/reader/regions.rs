@@ -21,10 +21,12 @@ pub struct Regions {
     pub of_base: Vec<u16>,
     /// Of each block, ascending.
     pub of_blocks: Vec<Vec<u16>>,
+    /// By field whether it jumps; with flag 1 of the header.
+    pub jumps: Vec<bool>,
 }
 
 /// The regions of a file with so many blocks; none if it has none.
-pub fn find(front: &[Section<'_>], info: &Info, blocks: usize) -> Option<Regions> {
+pub fn find(front: &[Section<'_>], info: &Info, blocks: usize, has_sides: bool) -> Option<Regions> {
     let place = |kind: &[u8; 4]| front.iter().position(|section| &section.kind == kind);
     let at = place(b"regn")?;
     assert!(info.kind == 3 && place(b"INDX") < Some(at) && Some(at) < place(b"MODL"));
@@ -51,9 +53,15 @@ pub fn find(front: &[Section<'_>], info: &Info, blocks: usize) -> Option<Regions
         regions
     };
     let of_blocks = (0..blocks).map(|_| of_block(&mut bytes)).collect();
+    let jump = |bytes: &mut Bytes<'_>| match bytes.u8() {
+        0 => false,
+        1 => true,
+        other => panic!("a field that jumps by {other}"),
+    };
+    let jumps = info.fields.iter().filter(|_| has_sides).map(|_| jump(&mut bytes)).collect();
     bytes.end();
     assert!(all.is_sorted_by(|a, b| a.labels < b.labels));
-    Some(Regions { arrays, all, deviation, of_base, of_blocks })
+    Some(Regions { arrays, all, deviation, of_base, of_blocks, jumps })
 }
 
 fn region(bytes: &mut Bytes<'_>, arrays: usize, info: &Info) -> Region {

@@ -92,7 +92,7 @@ pub fn sections(file: &[u8]) -> Vec<Section<'_>> {
     assert_eq!(header.take(8), [0x89, 0x54, 0x4C, 0x4F, 0x44, 0x0D, 0x0A, 0x1A]);
     assert_eq!(header.u16(), 2, "the version");
     let _reserved = header.u16();
-    assert!(header.u32() & 0xFFFF <= 1, "critical flags");
+    assert!(header.u32() & 0xFFFF <= 3, "critical flags");
     let total = header.u64();
     assert!(total == 0 || total == file.len() as u64);
     let _reserved = header.u32();
