@@ -177,7 +177,8 @@ fn keep<T>(list: &mut Vec<T>, kept: &[bool]) {
 fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
     let opened = &answer.opened;
     let reference = input::read_reference(&[input.to_owned()], opened)?;
-    let reference = split(&reference, opened.session.regions()).map_err(anyhow::Error::msg)?.mesh;
+    let split = split(&reference, opened.session.regions()).map_err(anyhow::Error::msg)?;
+    let reference = &split.mesh;
     let info = opened.info()?;
     let name = &info.fields[answer.field].name;
     let field = reference.fields.iter().find(|field| info.fields[answer.field].is_of(field));
@@ -197,9 +198,13 @@ fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
             _ => continue,
         };
         let inside = |p: &[f64; 3]| region.is_none_or(|region| region.contains(*p));
-        let chosen = reference.positions.iter().zip(&field.values).filter(|(p, _)| inside(p));
-        let (positions, values): (Vec<[f64; 3]>, Vec<f64>) = chosen.unzip();
-        let reference = Reference { positions: &positions, values: &values, field: answer.field };
+        let chosen: Vec<usize> =
+            (0..reference.positions.len()).filter(|&v| inside(&reference.positions[v])).collect();
+        let positions: Vec<[f64; 3]> = chosen.iter().map(|&v| reference.positions[v]).collect();
+        let values: Vec<f64> = chosen.iter().map(|&v| field.values[v]).collect();
+        let regions: Vec<u16> = chosen.iter().filter_map(|&v| Some(split.regions.get(v)?.0)).collect();
+        let (positions, values, regions) = (&positions[..], &values[..], &regions[..]);
+        let reference = Reference { positions, values, field: answer.field, regions };
         let bound = answer.stats.bounds.get(i);
         let promise = bound.map(|bound| Promise::of(info, answer.field, *bound));
         let part = Part { ranges, promise };

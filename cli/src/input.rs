@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::mesh::{CellsToPoints, RepairLevel, RepairReport, TetMesh, repair_at};
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::{MultiTessellation, Regions};
 use tetralod_build::verify::Reference;
 use tetralod_io as io;
 use tetralod_io::{CellData, FieldSelection, MemoryLimit, ReadOptions, ReadReason, Step};
@@ -167,15 +167,6 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Reads a mesh and mends what can be mended.
-pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
-    let wanted = FieldSelection { names: &[], all: true, labels: &[], cells: CellData::LeaveOut };
-    let (mesh, report) =
-        read_cells(&[path.to_owned()], &wanted, RepairLevel::Safe, Source::default(), false)?;
-    expect_cells(&mesh, path)?;
-    Ok((mesh, report))
-}
-
 /// Reads what the MT was built from: time steps of a mesh, mended as it was then, or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let mut mesh = read_reference_alone(paths, opened)?;
@@ -189,7 +180,7 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
     let regions = opened.mt()?.regions();
     let labels = regions.map_or(&[][..], |regions| &regions.arrays);
-    let jumps = regions.is_some_and(|regions| !regions.sides.jumps.is_empty());
+    let jumps = regions.is_some_and(Regions::has_sides);
     let to_points = if jumps { CellsToPoints::ByRegion } else { CellsToPoints::AcrossRegions };
     let wanted = FieldSelection { names: &names, all: false, labels, cells: CellData::Values };
     // Of several time steps it may have been built from one.

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::session::RegionStats;
 use tetralod::view::{FieldStats, Histogram};
+use tetralod_build::verify::split;
 
 /// Computes the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
 #[derive(clap::Args)]
@@ -184,9 +185,12 @@ fn of_regions(answer: &mut Answer) -> Vec<Region> {
 }
 
 fn compare(path: &Path, answer: &Answer, sums: &Sums, mut reference: Sums) -> Result<Compared> {
-    let (mesh, _) = input::read_mesh(path)?;
-    let name = &answer.summary.field;
-    let Some(field) = mesh.fields.iter().find(|field| field.name == *name) else {
+    let opened = &answer.opened;
+    let input = input::read_reference(&[path.to_owned()], opened)?;
+    let mesh = split(&input, opened.session.regions()).map_err(anyhow::Error::msg)?.mesh;
+    let info = &opened.info()?.fields[answer.field];
+    let Some(field) = mesh.fields.iter().find(|field| info.is_of(field)) else {
+        let name = &info.name;
         bail!("{}: there is no field '{name}'; give the mesh that the MT was built from", path.display());
     };
     for tet in &mesh.tets {

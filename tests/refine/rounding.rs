@@ -63,6 +63,7 @@ fn bounds_hold_where_the_input_has_its_vertices() {
                     positions: &input.positions,
                     values: &input.fields[0].values,
                     field: 0,
+                    regions: &[],
                 };
                 let promise = Some(measure::Promise::of(mt.info(), 0, bound));
                 let part = measure::Part { promise, ..measure::Part::default() };

@@ -162,6 +162,7 @@ fn within_bound(subject: &Subject, front: &Front, bound: ErrorCode) {
             positions: &subject.input.positions,
             values: &subject.input.fields[f].values,
             field: f,
+            regions: &[],
         };
         let found = deviation(info, front.mesh(), &reference, &Part::default());
         // What the lattices round off is the least that there can be.

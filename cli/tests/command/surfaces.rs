@@ -281,6 +281,28 @@ fn statistics_are_those_of_the_box() {
 }
 
 #[test]
+fn statistics_are_compared_with_fields_at_cells() {
+    let folder = Folder::new("cell-stats");
+    let [input, apart, across] = ["two.vtk", "apart.mt", "across.mt"].map(|name| folder.path(name));
+    let points = "POINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\nCELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\nCELL_TYPES 2\n10\n10\n";
+    let data = "CELL_DATA 2\nSCALARS part int 1\nLOOKUP_TABLE default\n7 9\nSCALARS m double 1\nLOOKUP_TABLE default\n8 4\n";
+    let head = "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\n";
+    fs::write(&input, [head, points, data].concat()).expect("a file");
+    let build = ["build", &input, "--cell-to-point", "--preserve", "part", "--field", "m", "-o"];
+    good(&[&build[..], &[&apart]].concat());
+    good(&[&build[..], &[&across, "--mean-across-regions"]].concat());
+    // The volumes are 1/6 and 3/6; the mean across regions is 5 where they meet.
+    for (mt, integral) in
+        [(&apart, (8.0 + 3.0 * 4.0) / 6.0), (&across, (23.0 / 4.0 + 3.0 * 19.0 / 4.0) / 6.0)]
+    {
+        let report = json(&["stats", mt, "--reference", &input, "--json"]);
+        assert!(near(number(&report, "integral"), integral), "{report}");
+        assert!(near(number(&report["reference"], "integral"), integral), "{report}");
+        assert!(number(&report["reference"], "histogram_error") < 1e-2, "{report}");
+    }
+}
+
+#[test]
 fn statistics_of_regions_add_up_and_those_of_one_are_its_own() {
     let folder = Folder::new("region-stats");
     let [input, mt] = ["t.vtu", "t.mt"].map(|name| folder.path(name));

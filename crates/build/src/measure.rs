@@ -28,6 +28,8 @@ pub struct Reference<'a> {
     pub values: &'a [f64],
     /// Which field of the MT these values are.
     pub field: usize,
+    /// Where the field jumps, the region of each point: no tetrahedron of another one tells anything of it. Else empty.
+    pub regions: &'a [u16],
 }
 
 /// Where to measure.
@@ -85,8 +87,8 @@ pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, p
     let pairs = reference.positions.iter().zip(reference.values);
     let mut points: Vec<Point> = pairs.map(|(p, value)| Point::new(*p, *value)).collect();
     let grid = PointGrid::new(points.iter().map(|p| info.lattice.nearest(p.place.to_array())).collect());
-    for tet in mesh.tets() {
-        measure.look_inside(*tet, &grid, &mut points);
+    for t in 0..mesh.tets().len() {
+        measure.look_inside(t, &grid, &mut points);
     }
     measure.look_beside(&mut points);
     let mut largest = Deviation::default();
@@ -154,7 +156,8 @@ impl Measure<'_> {
         ranges.is_empty() || ranges.iter().any(|&[from, to]| low <= to && from <= high)
     }
 
-    fn look_inside(&self, tet: [u32; 4], grid: &PointGrid, points: &mut [Point]) {
+    fn look_inside(&self, t: usize, grid: &PointGrid, points: &mut [Point]) {
+        let (tet, region) = (self.mesh.tets()[t], self.mesh.regions().get(t));
         let corners = tet.map(|slot| self.mesh.positions()[slot as usize]);
         let values = self.values(tet);
         let spans = self.spans(values);
@@ -165,7 +168,8 @@ impl Measure<'_> {
             let place = (point.place - origin) / step;
             let Some(weights) = tet.weights(grid.points()[i as usize], place) else { return };
             point.inside = true;
-            if spans {
+            let is_beside = self.reference.regions.get(i as usize).is_none_or(|own| Some(own) == region);
+            if spans && is_beside {
                 point.compare(weights.iter().zip(values).map(|(w, v)| w * v).sum(), 0.0);
             }
         });

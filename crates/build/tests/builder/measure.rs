@@ -40,7 +40,7 @@ fn measure(points: &[([i32; 3], f64)], part: &Part) -> (f64, f64, u64) {
     let (info, mesh) = mesh();
     let positions: Vec<_> = points.iter().map(|(q, _)| info.lattice.point(*q)).collect();
     let values: Vec<_> = points.iter().map(|(_, value)| *value).collect();
-    let reference = Reference { positions: &positions, values: &values, field: 0 };
+    let reference = Reference { positions: &positions, values: &values, field: 0, regions: &[] };
     let found = deviation(&info, &mesh, &reference, part);
     (found.field, found.distance, found.vertices)
 }
