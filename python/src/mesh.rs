@@ -171,6 +171,7 @@ impl Mesh {
             let view = self.view(field);
             let mut surface = IsoSurface::new();
             surface.set_normal_kind(if is_smooth { NormalKind::Smooth } else { NormalKind::Gradient });
+            surface.set_regions(!self.regions.is_empty());
             surface.extract_all(&view, &values);
             let own = self.values(field).as_ptr();
             // Of its own field they are the isovalues, without rounding.

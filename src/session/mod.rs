@@ -382,6 +382,7 @@ impl Session {
         self.catch_up();
         let mesh = view(self.front.as_ref(), &self.shown);
         let MeshChanges { vertices, tets } = self.behind.take(mesh.positions.len(), mesh.tets.len());
+        self.surface.set_regions(self.front.as_ref().is_some_and(|front| !front.mesh().regions().is_empty()));
         self.surface.update(&mesh, values, &vertices, &tets);
         Ok(&self.surface)
     }

@@ -1,7 +1,8 @@
 //! How much the field of one mesh differs from that of another one of the same domain: coarse against fine.
 
 use crate::geom::{TriangleGrid, weights_on_triangle};
-use crate::view::{BoundarySurface, FieldStats, MeshView, Probe};
+use crate::mesh::{BitSet, NONE};
+use crate::view::{BoundarySurface, FieldStats, MeshView, Place, Probe};
 use glam::DVec3;
 
 /// The field of one mesh minus that of another one.
@@ -53,11 +54,15 @@ impl Difference {
         }
         let mut boundary = None;
         let mut probe = Probe::new(other);
-        let places = probe.locate_all(mesh.positions);
+        let sought = inner_places(mesh);
+        let places = probe.locate_all(&sought);
         let mut outside = 0;
         let mut values = Vec::with_capacity(mesh.positions.len());
-        for ((p, place), own) in mesh.positions.iter().zip(places).zip(mesh.field) {
-            let there = match place {
+        for (((p, sought), place), own) in mesh.positions.iter().zip(sought).zip(places).zip(mesh.field) {
+            let beside = |place: Place| {
+                if *p == sought { place } else { probe.place_in(place.tet, *p).unwrap_or(place) }
+            };
+            let there = match place.map(beside) {
                 Some(place) => place.value(&other),
                 None => {
                     outside += 1;
@@ -75,6 +80,30 @@ impl Difference {
         Some(Self { values, root_mean_square: square.sqrt(), largest, outside })
     }
 }
+
+/// Where to look for the points of a mesh: those that others are at the same place as, as the points of regions are, a little inside of one of
+/// their tetrahedra.
+fn inner_places(mesh: &MeshView<'_>) -> Vec<[f64; 3]> {
+    let mut places = mesh.positions.to_vec();
+    let key = |v: &u32| mesh.positions[*v as usize].map(f64::to_bits);
+    let mut order: Vec<u32> = (0..places.len() as u32).collect();
+    order.sort_unstable_by_key(key);
+    let mut is_shared = BitSet::default();
+    for group in order.chunk_by(|a, b| key(a) == key(b)).filter(|group| group.len() > 1) {
+        group.iter().for_each(|v| _ = is_shared.insert(*v));
+    }
+    for tet in mesh.tets.iter().filter(|tet| tet[0] != NONE) {
+        let corners = tet.map(|v| DVec3::from(mesh.positions[v as usize]));
+        let middle = corners.into_iter().sum::<DVec3>() / 4.0;
+        for (&v, p) in tet.iter().zip(corners).filter(|(v, _)| is_shared.has(**v)) {
+            places[v as usize] = p.lerp(middle, INSIDE).to_array();
+        }
+    }
+    places
+}
+
+/// How far inside, as a part of the way to the middle of the tetrahedron.
+const INSIDE: f64 = 1e-3;
 
 /// The boundary of a mesh, and its triangles by place.
 struct Boundary {

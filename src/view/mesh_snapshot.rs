@@ -157,7 +157,8 @@ impl MeshSnapshot {
         dirty.points.extend(moved);
     }
 
-    /// Finds the tetrahedra around a point; false if they are not connected through faces, so that some are missing.
+    /// Finds the tetrahedra around a point; false if they are not connected through faces, so that some are missing, or there is another point of
+    /// the same value at its place, behind such a face.
     pub fn star(&mut self, mesh: &MeshView<'_>, point: u32, found: &mut Vec<u32>) -> bool {
         found.clear();
         let Star { tet, count } = self.stars[point as usize];
@@ -166,19 +167,24 @@ impl MeshSnapshot {
             found.push(tet);
             self.seen.insert(tet);
         }
-        let mut next = 0;
+        let (mut next, mut is_alone) = (0, true);
         while let Some(t) = found.get(next).map(|t| *t as usize) {
             next += 1;
             for (corner, n) in mesh.tets[t].into_iter().zip(mesh.neighbors[t]) {
                 // Most have been visited; only the others are examined.
-                if corner != point && !self.seen.has(n) && has(n) {
+                if corner == point || n == NONE || self.seen.has(n) {
+                    continue;
+                }
+                if has(n) {
                     self.seen.insert(n);
                     found.push(n);
+                } else {
+                    is_alone &= twin(mesh, point, mesh.tets[n as usize]).is_none();
                 }
             }
         }
         self.seen.clear_listed(found);
-        found.len() == count as usize
+        is_alone && found.len() == count as usize
     }
 }
 
@@ -187,6 +193,12 @@ pub(super) fn entries(ranges: &[Range<u32>], old: usize, new: usize) -> impl Ite
     let common = old.min(new) as u32;
     let ranges = ranges.iter().flat_map(move |range| range.start.min(common)..range.end.min(common));
     ranges.chain(common..new as u32)
+}
+
+/// The corner of a tetrahedron behind a face with a point that is at its place and has its value, if that is another point.
+pub(super) fn twin(mesh: &MeshView<'_>, point: u32, other: [u32; 4]) -> Option<u32> {
+    let own = || bits(mesh, point as usize);
+    if other.contains(&point) { None } else { other.into_iter().find(|&q| bits(mesh, q as usize) == own()) }
 }
 
 fn bits(mesh: &MeshView<'_>, point: usize) -> [u64; 4] {

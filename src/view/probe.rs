@@ -123,8 +123,12 @@ impl<'a> Probe<'a> {
         }
         let tet = self.find(p).or_else(|| self.find_beside(p))?;
         self.last = tet;
-        let sides = self.sides(tet, p)?;
-        Some(Place { tet, weights: weights(sides) })
+        self.place_in(tet, p)
+    }
+
+    /// The place of a point as one of a tetrahedron, in which it need not be.
+    pub(super) fn place_in(&self, tet: u32, p: [f64; 3]) -> Option<Place> {
+        Some(Place { tet, weights: weights(self.sides(tet, p)?) })
     }
 
     /// The locations of many points, with a grid if there are enough.

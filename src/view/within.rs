@@ -3,7 +3,8 @@
 //! What holds:
 //! - It is the part of the domain where the field, linear in each tetrahedron, is between the ends or equal to one; parts without a volume
 //!   are left out, and so are all tetrahedra that touch it only. Its boundary follows the isosurfaces at both ends.
-//! - It conforms: pieces of neighbours share their faces, whose triangles depend on the corners of the face alone.
+//! - It conforms: pieces of neighbours share their faces, whose triangles depend on the corners of the face alone. Regions that have points of
+//!   their own at one place are neighbours where their faces are at the same places; where the field jumps, they are cut in different places.
 //! - Points keep their numbers; those on edges that are cut come behind them, as the isosurfaces have them. Tetrahedra that are whole
 //!   keep their numbers, and the first piece of each other one has its number; all other pieces come behind. What is left out is a free slot.
 //! - Same mesh, same bytes; and how pieces are cut depends on the places of points, not on their numbers, which another way to the same mesh
@@ -79,6 +80,42 @@ impl Cutter<'_> {
                 crossing.place(self.positions, crossing.fraction(end, |point| self.by[point as usize]))
             }
         }
+    }
+
+    /// Of faces without a neighbour, each a tetrahedron and a corner opposite, those between regions that have points of their own there: they are at
+    /// the same places, and of tetrahedra that were neighbours.
+    fn pairs_of_regions(
+        &self,
+        mesh: &MeshView<'_>,
+        alone: &[(u32, usize)],
+        (tets, wholes): (&[[u32; 4]], &[u32]),
+    ) -> Vec<[(u32, usize); 2]> {
+        let whole = |t: u32| (t as usize).checked_sub(mesh.tets.len()).map_or(t, |piece| wholes[piece]);
+        let is_at_other_points = |t: u32, n: u32| {
+            let other = if n == NONE { return false } else { mesh.tets[n as usize] };
+            mesh.tets[t as usize].iter().filter(|v| other.contains(v)).count() < 3
+        };
+        let mut faces: Vec<([[u64; 3]; 3], (u32, usize))> = Vec::new();
+        for &(t, i) in alone {
+            let own = whole(t);
+            if mesh.neighbors[own as usize].into_iter().any(|n| is_at_other_points(own, n)) {
+                let mut places =
+                    FACES[i].map(|k| self.place(tets[t as usize][k]).map(|x| (x + 0.0).to_bits()));
+                places.sort_unstable();
+                faces.push((places, (t, i)));
+            }
+        }
+        faces.sort_unstable();
+        let mut pairs = Vec::new();
+        for group in faces.chunk_by(|a, b| a.0 == b.0) {
+            for (k, (_, a)) in group.iter().enumerate() {
+                let is_beside = |(_, b): &&([[u64; 3]; 3], (u32, usize))| {
+                    mesh.neighbors[whole(a.0) as usize].contains(&whole(b.0))
+                };
+                pairs.extend(group[k + 1..].iter().find(is_beside).map(|(_, b)| [*a, *b]));
+            }
+        }
+        pairs
     }
 
     /// The order of points by their places; of those at one place by their numbers.
@@ -201,8 +238,14 @@ impl MeshWithin {
         }
         halves.extend(open.into_iter().flat_map(|t| (0..4).map(move |i| (t, i))).map(|(t, i)| half(t, i)));
         halves.sort_unstable();
-        for pair in halves.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-            let [(_, t, i), (_, s, j)] = [pair[0], pair[1]];
+        let mut alone = Vec::new();
+        for group in halves.chunk_by(|a, b| a.0 == b.0) {
+            match group {
+                &[(_, t, i), (_, s, j)] => (neighbors[t as usize][i], neighbors[s as usize][j]) = (s, t),
+                _ => alone.extend(group.iter().map(|&(_, t, i)| (t, i))),
+            }
+        }
+        for [(t, i), (s, j)] in cutter.pairs_of_regions(mesh, &alone, (&tets, &wholes)) {
             (neighbors[t as usize][i], neighbors[s as usize][j]) = (s, t);
         }
         let (positions, values) = (mesh.positions.to_vec(), by[..points as usize].to_vec());

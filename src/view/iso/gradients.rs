@@ -2,12 +2,16 @@
 //!
 //! The terms are always added in the order of the tetrahedra, whichever way they are found, so that a gradient
 //! depends on the mesh alone to the last bit.
+//!
+//! Where other fields jump between regions, a mesh has a point for each region at one place. Where this field does not jump there, its surface
+//! passes, and these points have one gradient: that of the tetrahedra around all of them.
 
-use crate::mesh::NONE;
+use crate::mesh::{FACES, NONE};
 use crate::view::MeshView;
 use crate::view::marching::{Crossing, select};
-use crate::view::mesh_snapshot::MeshSnapshot;
+use crate::view::mesh_snapshot::{MeshSnapshot, twin};
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// In place of an undefined normal.
 pub(super) const NO_NORMAL: [f32; 3] = [0.0; 3];
@@ -20,6 +24,10 @@ pub(super) struct Gradients {
     points: Vec<u32>,
     /// The gradient; while it is summed, six times volume · gradient and six times the volume.
     means: Vec<[f64; 4]>,
+    /// Whether regions may have points of their own at one place.
+    pub has_regions: bool,
+    /// Points that have one gradient with others at the same place.
+    shared: Vec<u32>,
 }
 
 /// With fewer points than tetrahedra / this, their stars are looked up one by one.
@@ -29,10 +37,18 @@ impl Gradients {
     /// Forgets everything; there are `points` points from now on.
     pub fn clear(&mut self, points: usize) {
         self.means.clear();
+        self.shared.clear();
         for point in self.points.drain(..) {
             self.slots[point as usize] = NONE;
         }
         self.slots.resize(points, NONE);
+    }
+
+    /// Forgets the gradients that several points have: whatever has changed around one has changed around all of them. Gives these points.
+    pub fn forget_shared(&mut self) -> Vec<u32> {
+        let shared = std::mem::take(&mut self.shared);
+        shared.iter().for_each(|point| self.forget(*point));
+        shared
     }
 
     /// Forgets the points that go.
@@ -77,14 +93,7 @@ impl Gradients {
         wanted: &mut Vec<u8>,
     ) {
         let start = self.points.len();
-        for point in points {
-            let slot = &mut self.slots[point as usize];
-            if *slot == NONE {
-                *slot = self.points.len() as u32;
-                self.points.push(point);
-            }
-        }
-        self.means.resize(self.points.len(), [0.0; 4]);
+        points.for_each(|point| self.add(point));
         let new = self.points.len() - start;
         if new == 0 {
             return;
@@ -106,12 +115,21 @@ impl Gradients {
                 }
             }
             _ => {
-                let points = std::mem::take(&mut self.points);
-                self.pass(mesh, &points[start..], wanted, &mut found);
-                self.points = points;
+                let points = self.points[start..].to_vec();
+                self.pass(mesh, &points, wanted, &mut found);
             }
         }
         self.means[start..].iter_mut().for_each(divide);
+    }
+
+    /// Makes room for the gradient at a point.
+    fn add(&mut self, point: u32) {
+        let slot = &mut self.slots[point as usize];
+        if *slot == NONE {
+            *slot = self.points.len() as u32;
+            self.points.push(point);
+            self.means.push([0.0; 4]);
+        }
     }
 
     /// Recomputes the known gradient of a point from the tetrahedra around it.
@@ -126,18 +144,65 @@ impl Gradients {
         wanted.clear();
         wanted.resize(mesh.positions.len(), 0);
         points.iter().for_each(|point| wanted[*point as usize] = 1);
-        found.clear();
-        select(mesh.tets, 0, found, |tet| tet.iter().fold(0, |all, p| all | wanted[*p as usize]) != 0);
+        let mut one_of = BTreeMap::new();
+        loop {
+            found.clear();
+            select(mesh.tets, 0, found, |tet| tet.iter().fold(0, |all, p| all | wanted[*p as usize]) != 0);
+            let pairs = if self.has_regions { twins(mesh, found, wanted) } else { Vec::new() };
+            let mut is_complete = true;
+            for [p, q] in pairs {
+                let (a, b) = (first_of(&one_of, p), first_of(&one_of, q));
+                if a != b {
+                    one_of.insert(a.max(b), a.min(b));
+                }
+                is_complete &= std::mem::replace(&mut wanted[q as usize], 1) != 0;
+                self.add(q);
+            }
+            if is_complete {
+                break;
+            }
+        }
         for t in found {
             let term = weighted(mesh, *t);
             for point in mesh.tets[*t as usize] {
                 if wanted[point as usize] != 0 {
-                    let sum = &mut self.means[self.slots[point as usize] as usize];
+                    let sum = &mut self.means[self.slots[first_of(&one_of, point) as usize] as usize];
                     *sum = add(*sum, term);
                 }
             }
         }
+        for &point in one_of.keys() {
+            let [own, first] = [point, first_of(&one_of, point)].map(|p| self.slots[p as usize] as usize);
+            self.means[own] = self.means[first];
+        }
+        self.shared.extend(one_of.into_iter().flat_map(|(point, other)| [point, other]));
     }
+}
+
+/// Of points that have one gradient the one with which it is summed, given for each other one another of them.
+#[inline]
+fn first_of(one_of: &BTreeMap<u32, u32>, mut point: u32) -> u32 {
+    if !one_of.is_empty() {
+        while let Some(&other) = one_of.get(&point) {
+            point = other;
+        }
+    }
+    point
+}
+
+/// Pairs of a wanted point and one of another region at the same place, with the same value, seen at the faces of these tetrahedra.
+fn twins(mesh: &MeshView<'_>, tets: &[u32], wanted: &[u8]) -> Vec<[u32; 2]> {
+    let mut pairs = Vec::new();
+    for &t in tets {
+        let (tet, around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
+        for (face, n) in FACES.into_iter().zip(around).filter(|(_, n)| *n != NONE) {
+            let other = mesh.tets[n as usize];
+            for p in face.map(|k| tet[k]).into_iter().filter(|p| wanted[*p as usize] != 0) {
+                pairs.extend(twin(mesh, p, other).map(|q| [p, q]));
+            }
+        }
+    }
+    pairs
 }
 
 /// The sum over a star, which gets sorted for it.

@@ -10,7 +10,8 @@
 //! - No triangle names a vertex twice. Triangles of no area remain possible where rounding makes
 //!   neighbouring crossings coincide.
 //! - Inside the domain every directed edge has exactly as many opposite ones: the surface is closed. An edge has
-//!   two triangles, or an even number where the surface touches itself along points of exactly the isovalue.
+//!   two triangles, or an even number where the surface touches itself along points of exactly the isovalue. Between regions that have
+//!   points of their own the surface has vertices of its own in each, at the same places unless its field jumps there.
 //! - The result of an extraction depends on the order of points and tetrahedra only: same mesh, same bytes.
 //!
 //! [`IsoSurface::update`] follows a mesh that changes a little from call to call. What it makes is the surface that
@@ -37,7 +38,7 @@ pub enum NormalKind {
     #[default]
     Gradient,
     /// The mean over the triangles at a vertex, each with its area as weight: what is seen is the surface that is
-    /// there.
+    /// there. Regions that have vertices of their own at one place have normals of their own, too.
     Smooth,
 }
 
@@ -103,6 +104,13 @@ impl IsoSurface {
             self.state = State::Stale;
         }
         self.kind = kind;
+    }
+
+    /// Whether the meshes have regions, which may have points of their own at one place: normals are those of a surface that passes from one
+    /// to the next where its field does not jump.
+    #[doc(hidden)]
+    pub fn set_regions(&mut self, has_regions: bool) {
+        self.gradients.has_regions = has_regions;
     }
 
     /// Replaces this surface by the one of `mesh` at `value`.

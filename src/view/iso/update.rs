@@ -63,6 +63,7 @@ impl IsoSurface {
             self.splice(mesh, &dirty);
         } else {
             dirty.points(mesh).iter().for_each(|point| self.gradients.forget(*point));
+            self.gradients.forget_shared();
             self.gradients.resize(mesh.positions.len());
             self.rebuild(mesh, isovalues);
         }
@@ -134,7 +135,9 @@ impl IsoSurface {
         let list = &self.pieces.crossings.list;
         let mut star = Vec::new();
         let mut lost = BitSet::default();
-        let mut any_lost = false;
+        let shared = self.gradients.forget_shared();
+        let mut any_lost = !shared.is_empty();
+        shared.into_iter().for_each(|point| _ = lost.insert(point));
         for point in dirty.points(mesh) {
             if !self.gradients.has(point) {
                 continue;

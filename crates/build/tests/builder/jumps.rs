@@ -1,15 +1,17 @@
 //! Fields that jump where regions meet: a vertex there has a value for each of them.
 
-use crate::support::meshes::blocks;
+use crate::parts::{bytes, in_parts};
+use crate::support::meshes::{bent, blocks};
 use std::collections::BTreeMap;
 use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, encode};
 use tetralod::geom::Lattice;
-use tetralod::mesh::{CellsToPoints, Field, TetMesh};
+use tetralod::mesh::{CellsToPoints, Field, NONE, TetMesh};
 use tetralod::mt::{
     CurrentMesh, HalfEdgeMt, HalfEdgeUpdate, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
 };
 use tetralod::refine::{Front, LodCriterion, Request};
 use tetralod::session::Session;
+use tetralod::view::{Difference, IsoSurface, MeshView, MeshWithin};
 use tetralod_build::verify::{self, Reference, Sample};
 use tetralod_build::{BuildConfig, BuildError, Construction, build};
 
@@ -37,7 +39,11 @@ fn middles(mesh: &TetMesh) -> Vec<[f64; 3]> {
 /// jumps, `material` is constant in each.
 fn parted(seed: u64, label: impl Fn([f64; 3]) -> f64) -> TetMesh {
     let field = |p: [f64; 3]| (7.0 * p[0]).sin() + p[1] * p[2];
-    let mut mesh = blocks([N; 3], &[field], |[x, y, _]| x < N - 2 || y > 1);
+    with_cells(blocks([N; 3], &[field], |[x, y, _]| x < N - 2 || y > 1), seed, label)
+}
+
+/// A mesh of one field with such regions and fields.
+fn with_cells(mut mesh: TetMesh, seed: u64, label: impl Fn([f64; 3]) -> f64) -> TetMesh {
     mesh.fields[0].name = "heat".into();
     let middles = middles(&mesh);
     let labels: Vec<f64> = middles.iter().copied().map(label).collect();
@@ -233,6 +239,50 @@ fn verification_holds_on_each_side_and_finds_what_is_wrong() {
 }
 
 #[test]
+fn parts_keep_the_values_of_each_region() {
+    // The lattice moves the points of the second one.
+    let inputs = [parted(13, random), with_cells(bent(9), 17, |[x, y, _]| quarters([x - 0.4, y - 0.5, 0.0]))];
+    for input in inputs {
+        let mesh = by_region(input.clone());
+        let whole = build(&mesh, &config()).expect("a mesh to build on");
+        assert!(bytes(&in_parts(&mesh, &config(), 1)) == bytes(&whole), "one part is the whole");
+        for parts in [2, 16] {
+            let built = in_parts(&mesh, &config(), parts);
+            let Mt::HalfEdge(mt) = &built.mt else { panic!("a half-edge MT") };
+            for error in [f64::INFINITY, 0.1, 0.0] {
+                let front = front_at(mt, &Request::within(error));
+                (1..4).for_each(|field| check_corners(mt, front.mesh(), &input, field));
+            }
+            let sample = Sample { requests: 6, vertices: usize::MAX };
+            let report = verify::run_sample(mt, &mesh, Reference::Mesh, sample, &mut |_, _| {});
+            assert!(report.valid, "{parts}: {:#?}", report.failures);
+            for sample in verify::samples(mt.info(), &mesh, 12, 0.05) {
+                let report = verify::run_request(mt, &mesh, &sample);
+                assert!(report.valid, "{parts}, {}: {:#?}", sample.name, report.failures);
+            }
+        }
+    }
+}
+
+#[test]
+fn single_requests_are_verified_on_each_side() {
+    let mesh = by_region(parted(19, quarters));
+    let mt = built(&mesh);
+    let failures = |input: &TetMesh| {
+        let samples = verify::samples(mt.info(), input, 12, 0.05);
+        let of = |sample| verify::run_request(&mt, input, sample).failures;
+        samples.iter().flat_map(of).collect::<Vec<String>>()
+    };
+    assert_eq!(failures(&mesh), [""; 0]);
+    let mut other = mesh.clone();
+    let stress = other.fields.iter_mut().find(|field| field.name == "stress").expect("it");
+    stress.sides.iter_mut().for_each(|value| *value += 0.5);
+    let found = failures(&other);
+    assert!(found.iter().any(|failure| failure.contains("reference vertex")), "{found:#?}");
+    assert!(found.iter().any(|failure| failure.contains("are of the input")), "{found:#?}");
+}
+
+#[test]
 fn curved_interfaces_that_move_keep_values_apart() {
     let curved = |[x, y, z]: [f64; 3]| {
         f64::from(u8::from((x - 0.5).powi(2) + (y - 0.5).powi(2) + (z - 0.5).powi(2) < 0.1))
@@ -249,6 +299,52 @@ fn curved_interfaces_that_move_keep_values_apart() {
     let sample = Sample { requests: 6, vertices: 1000 };
     let report = verify::run_sample(&mt, &mesh, Reference::Mesh, sample, &mut |_, _| {});
     assert!(report.valid, "{:#?}", report.failures);
+}
+
+#[test]
+fn what_does_not_jump_is_as_if_nothing_did() {
+    let input = by_region(parted(23, quarters));
+    let bytes = encode(&built(&input).into(), &EncodeOptions::default()).expect("an MT that can be written");
+    let mut session = Session::new();
+    session.feed(&bytes).expect("a sound file");
+    for error in [0.3, 0.1, 0.08, 0.02, 0.03, 0.0] {
+        session.refine(&Request::within(error)).expect("a valid MT");
+        session.set_field(0).expect("it is there");
+        // The surface that follows the mesh, one that is made anew, and that of the mesh with one point for all regions.
+        let followed = normals(session.isosurface(0.6).expect("a valid MT"));
+        let view = session.last_view();
+        let mesh = session.mesh().expect("it is here");
+        let joined = MeshView { tets: mesh.joined_tets(), ..view };
+        assert_ne!(joined.tets, view.tets);
+        let made = [view, joined].map(|mesh| {
+            let mut surface = IsoSurface::new();
+            surface.set_regions(true);
+            surface.extract(&mesh, 0.6);
+            normals(&surface)
+        });
+        let of_joined: BTreeMap<[u64; 3], [u32; 3]> = made[1].iter().copied().collect();
+        assert_eq!(made[1].len(), of_joined.len(), "one vertex at each place");
+        assert!(made[0].len() > of_joined.len(), "regions have vertices of their own");
+        assert_eq!(followed, made[0], "at {error}");
+        assert_eq!(made[0].iter().copied().collect::<BTreeMap<_, _>>(), of_joined, "at {error}");
+        assert!(made[0].iter().all(|(place, normal)| of_joined[place] == *normal), "at {error}");
+        // What is cut at the ends of a range hangs together.
+        let open = [view, joined].map(|mesh| {
+            let within = MeshWithin::of(&mesh, mesh.field, [0.2, 1.1]);
+            let cut = within.view(within.values());
+            let shown = cut.tets.iter().zip(cut.neighbors).filter(|(tet, _)| tet[0] != NONE);
+            shown.flat_map(|(_, around)| around).filter(|n| **n == NONE).count()
+        });
+        assert_eq!(open[0], open[1], "at {error}");
+    }
+}
+
+/// The vertices of a surface with their normals, in an order of places.
+fn normals(surface: &IsoSurface) -> Vec<([u64; 3], [u32; 3])> {
+    let each = surface.positions.iter().zip(&surface.normals);
+    let mut all: Vec<_> = each.map(|(p, n)| (p.map(f64::to_bits), n.map(f32::to_bits))).collect();
+    all.sort_unstable();
+    all
 }
 
 #[test]
@@ -281,6 +377,23 @@ fn constants_of_materials_lose_nothing_and_have_no_surface_between_them() {
             let surface = session.isosurface(value).expect("a valid MT");
             assert!(surface.indices.is_empty(), "{value} at {error}");
         }
+    }
+    // Compared with each other, too, meshes have the values of the same region at each point.
+    let mut kept = |error: f64| {
+        session.refine(&Request::within(error)).expect("a valid MT");
+        let MeshView { positions, field, tets, neighbors } = session.view();
+        (positions.to_vec(), field.to_vec(), tets.to_vec(), neighbors.to_vec())
+    };
+    let meshes = [kept(0.5), kept(0.0)];
+    let [coarse, fine] = meshes.each_ref().map(|(positions, field, tets, neighbors)| MeshView {
+        positions,
+        field,
+        tets,
+        neighbors,
+    });
+    for (a, b) in [(coarse, fine), (fine, coarse)] {
+        let difference = Difference::of(&a, b).expect("there are tetrahedra");
+        assert!(difference.largest < 1e-3, "{}", difference.largest);
     }
 }
 

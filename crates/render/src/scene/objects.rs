@@ -215,6 +215,7 @@ impl Isosurface {
             f64::midpoint(low, high)
         };
         let value = state.value.or(input.isovalue).unwrap_or_else(middle);
+        self.surface.set_regions(!input.regions.is_empty());
         self.surface.update(&mesh, &[value], &input.changes.vertices, &input.changes.tets);
         self.changes = self.surface.take_changes();
         let is_coloured = state.field.is_some() || input.largest_difference.is_some();
