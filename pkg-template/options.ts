@@ -107,7 +107,7 @@ export interface RefineOptions extends Need {
   whereBox?: NonNullable<Need["box"]>;
   /** The mesh may have at most so many tetrahedra; the error is then as small as that allows. Default: no limit. */
   maxTets?: number;
-  /** At most so many vertices. Default: no limit. */
+  /** At most so many vertices, as the arrays of the mesh have them: where fields jump between regions, one for each region. Default: no limit. */
   maxVertices?: number;
   /** At most so many bytes of arrays: 32 a tetrahedron and 16 a vertex. Default: no limit. */
   maxBytes?: number;

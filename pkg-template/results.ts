@@ -286,7 +286,10 @@ export interface Mesh extends Stored {
   fields: FieldValues[];
   /** Four vertices a tetrahedron, positive: (b - a) x (c - a) . (d - a) > 0. */
   tets: Uint32Array;
-  /** Four tetrahedra a tetrahedron: the i-th lies across from its i-th vertex; 0xffffffff at the boundary. */
+  /**
+   * Four tetrahedra a tetrahedron: the i-th lies across from its i-th vertex; 0xffffffff at the boundary. Where fields jump between regions, neighbours have
+   * vertices of their own at the same places.
+   */
   neighbors: Uint32Array;
 }
 

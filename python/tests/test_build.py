@@ -118,6 +118,28 @@ def test_a_mesh_of_pyvista_or_meshio_is_built_as_its_file(folder, options):
     assert bytes_of(arrays) == expected
 
 
+def test_fields_at_cells_keep_their_jump_between_regions():
+    points, cells = grid_points(7), hexahedra(7)
+    left = points[cells].mean(axis=1)[:, 0] < 0.5
+    data = {"part": np.where(left, 3, 8), "m": np.where(left, 10.0, -4.0)}
+    options = {"preserve": ["part"], "cell_to_point": True, "fields": ["m"]}
+    mt = tetralod.build(points, {12: cells}, {}, data, **options)
+    assert mt.report["averaged"][0]["difference"]["largest"] < 1e-12
+    for error in (0, "10%"):
+        mesh = mt.refine(error=error)
+        part, values = np.asarray(mesh.cell_data["part"]), mesh.point_data["m"]
+        assert np.allclose(values[mesh.tets], np.where(part == 3, 10, -4)[:, None], atol=1e-3)
+        # At the interface there are two points at each place, and tetrahedra know those behind it.
+        at = mesh.points[np.isclose(mesh.points[:, 0], 0.5)]
+        assert len(at) == 2 * len(np.unique(at, axis=0)) > 0
+        behind = mesh.neighbors[part == 3]
+        assert (part[behind[behind != 0xFFFFFFFF]] == 8).any()
+        assert mesh.boundary().to_pyvista().area == pytest.approx(6, abs=1e-3)
+    one = tetralod.build(points, {12: cells}, {}, data, mean_across_regions=True, **options).refine(error=0)
+    assert len(one.points) == len(points)
+    assert np.allclose(one.point_data["m"][np.isclose(one.points[:, 0], 0.5)], 3, atol=1e-3)
+
+
 def test_polyhedra_are_built_as_their_file(folder):
     points, faces = polyhedron()
     lists = np.concatenate([[len(faces)], *([len(face), *face] for face in faces)])

@@ -141,6 +141,35 @@ test("labels at cells, and parts that do not touch, become regions", async () =>
   await assert.rejects(build(source.slice(), { preserve: ["rotor"] }), { code: "bad-option", message: /rotor/ });
 });
 
+test("fields at cells keep their jump between regions, or get a mean across them", async () => {
+  const points = "POINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\nCELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\nCELL_TYPES 2\n10\n10\n";
+  const data = "CELL_DATA 2\nSCALARS part int 1\nLOOKUP_TABLE default\n7 9\nSCALARS m double 1\nLOOKUP_TABLE default\n8 4\n";
+  const source = new TextEncoder().encode(`# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n${points}${data}`);
+  const options = { cellToPoint: true, preserve: ["part"], fields: ["m"] };
+  /** The values at each place, and the largest difference that averaging has made. */
+  const read = async (more) => {
+    const { bytes, report } = await build(source.slice(), { ...options, ...more });
+    const mt = await MultiTessellation.open(bytes);
+    const { positions, field, scale, offset, tets, neighbors } = await mt.refine({ error: 0 });
+    mt.free();
+    const values = new Map();
+    field.forEach((value, v) => {
+      const place = Array.from(positions.slice(3 * v, 3 * v + 3), Math.round).join(" ");
+      values.set(place, [...(values.get(place) ?? []), Math.round(value * scale + offset)].sort());
+    });
+    // Each cell has the other one behind one face, whatever points it has there.
+    for (const t of [0, 1]) assert.equal(neighbors.slice(4 * t, 4 * t + 4).filter((n) => n === 1 - t).length, 1);
+    assert.equal(new Set(tets).size, field.length);
+    return [Object.fromEntries(values), report.averaged[0].difference.largest];
+  };
+  const [apart, difference] = await read({});
+  assert.deepEqual(apart, { "0 0 0": [4, 8], "1 0 0": [4, 8], "0 1 0": [4, 8], "0 0 1": [8], "0 0 -3": [4] });
+  assert.equal(difference, 0);
+  const [across, more] = await read({ meanAcrossRegions: true });
+  assert.deepEqual(across, { "0 0 0": [5], "1 0 0": [5], "0 1 0": [5], "0 0 1": [8], "0 0 -3": [4] });
+  assert.equal(more, 2.25);
+});
+
 test("what averaging does to fields at cells is in the report and in the file", async () => {
   const text =
     "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\nCELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\nCELL_TYPES 2\n10\n10\nCELL_DATA 2\nSCALARS m double 1\nLOOKUP_TABLE default\n8 4\n";
