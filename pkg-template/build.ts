@@ -161,13 +161,18 @@ export interface CoreBuildOptions {
   fields?: readonly string[];
   /** Whether to keep all fields but what follows from others: magnitudes of vectors, von Mises' equivalent and principal values of symmetric tensors. */
   allFields?: boolean;
-  /** Whether fields at cells become fields at points: the mean of the cells around, weighted by volume. `averaged` of the report says what that does to them. */
+  /** Whether fields at cells become fields at points: the mean of the cells around, weighted by volume, of labels the most frequent one. `averaged` of the report says what that does to them. */
   cellToPoint?: boolean;
   /**
    * Gives points where regions meet (`preserve`) one value in fields that were at cells, the mean of all cells around. By default files of kind
    * `half-edge` keep a value for each region there, from the cells of that region alone.
    */
   meanAcrossRegions?: boolean;
+  /**
+   * Which fields are labels, by their names: whole numbers with nothing between two of them, shown by the nearest point; or, with `false`, are not.
+   * Default: integers of at most 256 different values whose name says that they number something, as `material`.
+   */
+  labels?: Readonly<Record<string, boolean>>;
   /**
    * What is repaired: nothing (a mesh that needs it is refused), what has only one sensible repair, or also points that lie on each other,
    * where that closes open seams or joins blocks that touch. Default: `"safe"`.
@@ -275,6 +280,8 @@ export interface AveragedField extends Averaged {
   /** `undefined` if it is not known. */
   unit?: string;
   time?: number;
+  /** Whether it is a label: `difference` is then of shares of a cell, 0 to 1, that have another one. */
+  isLabel: boolean;
   /** The smallest and the largest value at points, and where they are. */
   points: Extremes;
 }

@@ -33,6 +33,11 @@ export interface FieldInfo {
   time: number | undefined;
   /** Which component of which vector or tensor the field is, from 0, if it is one; without a number its length. */
   vector: { name: string; component: number | undefined } | undefined;
+  /**
+   * Whether it is a label: whole numbers that say what something is, such as materials, with nothing between two of them. A place has the label of
+   * the nearest corner of its tetrahedron.
+   */
+  isLabel: boolean;
   /** The error that is left in the reference mesh, in field units: what storing it rounds off. No bound is smaller. */
   floor: number;
   /**
@@ -178,7 +183,7 @@ export interface MtInfo {
   kind: "half-edge" | "edge" | "vertex";
   fields: FieldInfo[];
   /**
-   * The number of the field that is shown where none is asked for: the first that varies, is no component of a vector, and, by its name,
+   * The number of the field that is shown where none is asked for: the first that varies, is no label, no component of a vector, and, by its name,
    * neither numbers something nor says where it is.
    */
   firstField: number;

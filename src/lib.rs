@@ -119,6 +119,7 @@
 //! | *remover*, *creator* of a tetrahedron | the update whose `u+` removes it; the one whose `u+` inserted it |
 //! | *lattice*, *bits* | the integer coordinates of positions, or values of a field, and their number of binary digits; all meshes of an MT are on them |
 //! | *level* | the value of a field at a vertex as an integer on its lattice |
+//! | *label* | a field of whole numbers that say what something is: each place has that of the nearest corner of its tetrahedron ([`Field::is_label`](mesh::Field::is_label)); what `--preserve` names is one, too |
 //! | *quantization* | the largest loss by rounding to a lattice, measured when an MT is built; part of every bound |
 //! | *error* of a tetrahedron, of an update | the largest deviation from the input's field at the vertices of the reference mesh in the tetrahedron, as a fraction of the field's range; an upper bound of that for all tetrahedra that `u+` removes, and of the errors of all updates that depend on `u` |
 //! | *error code* | an error as an integer of 16 bits, rounded up ([`ErrorCode`](mt::ErrorCode)) |

@@ -22,9 +22,10 @@ export function averagedWords(fields) {
     const known = most.get(field.name);
     if (!known || field.difference.largest > known.difference.largest) most.set(field.name, field);
   }
-  return [...most.values()].map(({ name, unit, input, points, difference: { rms, largest } }) => {
+  return [...most.values()].map(({ name, unit, isLabel, input, points, difference: { rms, largest } }) => {
     const words = `input ${inCell(input.min)} to ${inCell(input.max)}, at points ${range(points)}`;
-    const differs = `differs by ${grouped(largest)} at most, root mean square ${grouped(rms)}`;
+    const [at, mean] = [largest, rms].map((share) => (isLabel ? `${grouped(100 * share)} %` : grouped(share)));
+    const differs = `${isLabel ? `another label in ${at} of a cell` : `differs by ${at}`} at most, root mean square ${mean}`;
     return `${name}${unit ? ` in ${unit}` : ""} is averaged from cells: ${words}; ${differs}`;
   });
 }

@@ -124,8 +124,9 @@ fn reference_units(
     regions: Option<&Regions>,
 ) -> TetMesh {
     let field = |(f, info): (usize, &FieldInfo)| {
-        let FieldInfo { name, unit, vector, time, .. } = info.clone();
-        Field { name, values: session.exact_values(f), unit, vector, time, ..Field::default() }
+        let FieldInfo { name, unit, vector, is_label, time, .. } = info.clone();
+        let values = session.exact_values(f);
+        Field { name, values, unit, vector, time, integer: is_label, is_label, ..Field::default() }
     };
     let mut whole = TetMesh {
         positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),

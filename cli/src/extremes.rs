@@ -20,24 +20,35 @@ fn ends(extremes: &Extremes, size: f64) -> String {
     format!("{min} to {max}")
 }
 
-/// What averaging has done to a field: what its values at cells are, and how far those at points are from them.
-pub fn averaged_rows(input: &Extremes, difference: &Difference, size: f64) -> [(&'static str, String); 2] {
-    let [rms, largest] = [difference.rms, difference.largest].map(output::number);
+/// What averaging has done to a field: what its values at cells are, and how far those at points are from them, or how much of cells has
+/// another label.
+pub fn averaged_rows(
+    is_label: bool,
+    input: &Extremes,
+    difference: &Difference,
+    size: f64,
+) -> [(&'static str, String); 2] {
+    let number = if is_label { output::percent } else { output::number };
+    let [rms, largest] = [difference.rms, difference.largest].map(number);
+    let of = if is_label { " of a cell" } else { "" };
     [
         ("  input at cells", ends(input, size)),
-        ("  difference", format!("root mean square {rms}, {largest} at most")),
+        (
+            if is_label { "  another label" } else { "  difference" },
+            format!("root mean square {rms}, {largest} at most{of}"),
+        ),
     ]
 }
 
 /// What averaging has done to the fields of a build.
 pub fn rows(fields: &[AveragedField], size: f64) -> Vec<(&'static str, String)> {
     let of = |field: &AveragedField| {
-        let AveragedField { name, unit, time, input, points, difference } = field;
+        let AveragedField { name, unit, time, is_label, input, points, difference } = field;
         let unit = if unit.is_empty() { String::new() } else { format!(" in {unit}") };
         let time = time.map(|time| format!(", time {}", output::exact(time))).unwrap_or_default();
         let head =
             [("averaged from cells", format!("{name}{unit}{time}")), ("  at points", ends(points, size))];
-        head.into_iter().chain(averaged_rows(input, difference, size))
+        head.into_iter().chain(averaged_rows(*is_label, input, difference, size))
     };
     fields.iter().flat_map(of).collect()
 }

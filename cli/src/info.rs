@@ -90,6 +90,9 @@ struct Field {
     vector: Option<VectorPart>,
     #[serde(skip_serializing_if = "Option::is_none")]
     time: Option<f64>,
+    /// Whether it is a label.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    is_label: bool,
     min: f64,
     max: f64,
     bits: u32,
@@ -235,7 +238,7 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
     let [[x0, y0, z0], [x1, y1, z1]] = found.or_else(stated).context("the file has no base mesh")?;
     let structure = structure.map(|(structure, _)| structure);
     let field = |(number, field): (usize, &FieldInfo)| {
-        let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
+        let FieldInfo { name, unit, vector, is_label, time, min, max, bits, quantization, .. } = field.clone();
         let (extremes, averaged) = (field.extremes.clone(), field.averaged.clone());
         let floor = info.floor(number);
         let (histogram, curve) = (opened.session.decoder().histogram(number), curve(opened, number));
@@ -244,6 +247,7 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
             unit,
             vector,
             time,
+            is_label,
             min,
             max,
             bits,
@@ -391,7 +395,7 @@ fn region_rows(regions: &Regions) -> Vec<(&str, String)> {
 
 /// A field for people, all its time steps in one row.
 fn field_row(steps: &[Field]) -> String {
-    let Field { name, unit, vector, time, min, max, bits, .. } = &steps[0];
+    let Field { name, unit, vector, time, is_label, min, max, bits, .. } = &steps[0];
     let part = match vector {
         Some(VectorPart { name, component: Some(component) }) => {
             format!(" (component {component} of {name})")
@@ -411,6 +415,7 @@ fn field_row(steps: &[Field]) -> String {
         (Some(time), _) => format!("; time {}", output::exact(time)),
         _ => String::new(),
     };
+    let part = if *is_label { " (label)" } else { &part };
     format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
 }
 
@@ -435,7 +440,8 @@ fn extreme_rows(steps: &[Field], size: f64) -> Vec<(&'static str, String)> {
     let most = changed.reduce(|a, b| if b.1.difference.largest > a.1.difference.largest { b } else { a });
     let averaged = most.into_iter().flat_map(|(step, Averaged { input, difference })| {
         let head = ("  averaged", format!("from cells by volume{}", of_time(step)));
-        std::iter::once(head).chain(extremes::averaged_rows(input, difference, size))
+        let rows = extremes::averaged_rows(step.is_label, input, difference, size);
+        std::iter::once(head).chain(rows)
     });
     [row("  smallest", min), row("  largest", max)].into_iter().flatten().chain(averaged).collect()
 }

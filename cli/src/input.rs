@@ -5,7 +5,7 @@ use super::{machine, output};
 use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use tetralod::mesh::{CellsToPoints, RepairLevel, RepairReport, TetMesh, repair_at};
+use tetralod::mesh::{CellsToPoints, Field, RepairLevel, RepairReport, TetMesh, repair_at};
 use tetralod::mt::{MultiTessellation, Regions};
 use tetralod_build::verify::Reference;
 use tetralod_io as io;
@@ -195,6 +195,11 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
         mesh.expand_grid();
     }
     if !mesh.is_grid_alone() {
+        let is_label =
+            |field: &Field| fields.iter().any(|info| info.is_label && info.is_of(field));
+        for field in mesh.fields.iter_mut().chain(&mut mesh.cell_fields) {
+            field.is_label = is_label(field);
+        }
         mesh.settle_cells(to_points, labels);
         mesh.add_geometry_fields(wanted.names);
     }

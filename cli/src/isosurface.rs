@@ -44,12 +44,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;
     let fields = answer.all_values()?;
+    let views = answer.views(&fields)?;
     let start = Instant::now();
     let mut surface = answer.opened.session.isosurfaces(isovalues)?.clone();
     let seconds = start.elapsed().as_secs_f64();
     let deformed = arguments.deform.of(&arguments.query, &answer)?;
     let mesh = answer.opened.session.view();
-    let mut values: Vec<Vec<f64>> = fields.iter().map(|field| surface.interpolate(&mesh, field)).collect();
+    let mut values: Vec<Vec<f64>> = views.into_iter().map(|field| surface.interpolate(&mesh, field)).collect();
     // Of its own field they are the isovalues, without rounding.
     values[answer.field].clone_from(&surface.values);
     let (deformation, displaced) = deformed.unzip();

@@ -126,10 +126,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let fields = answer.all_values()?;
     let written = answer.written_fields()?;
+    let views = answer.views(&fields)?;
     let mesh = answer.opened.session.view();
     let found = look(arguments, mesh, points);
     let seconds = start.elapsed().as_secs_f64();
-    let value = |sample: &Sample, f: usize| sample.place.map(|place| place.interpolate(&mesh, &fields[f]));
+    let value = |sample: &Sample, f: usize| sample.place.map(|place| place.interpolate(&mesh, views[f]));
     let all: Vec<Vec<Option<f64>>> =
         (0..fields.len()).map(|f| found.samples.iter().map(|sample| value(sample, f)).collect()).collect();
     let column = |(field, name)| Column { field, name, values: &all[field] };

@@ -16,6 +16,7 @@ use tetralod::mt::{FieldInfo, Mt, MtInfo, MultiTessellation};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Region, Request};
 use tetralod::session::{Client, ClientError};
 use tetralod::stream::Traffic;
+use tetralod::view::FieldView;
 use tetralod_io::{PointValues, PolyData};
 
 /// What the options look like in use.
@@ -512,6 +513,12 @@ impl Answer {
             step: fields[field].step,
         };
         Ok(self.written_fields()?.into_iter().map(named).collect())
+    }
+
+    /// All fields, whose values at the vertices of the mesh are these.
+    pub fn views<'a>(&self, values: &'a [Vec<f64>]) -> Result<Vec<FieldView<'a>>> {
+        let fields = self.opened.info()?.fields.iter().zip(values);
+        Ok(fields.map(|(info, values)| FieldView { values, is_label: info.is_label }).collect())
     }
 
     /// All fields at the vertices of the mesh, in the order of the MT.

@@ -48,6 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;
     let fields = answer.all_values()?;
+    let views = answer.views(&fields)?;
     let (deformation, displaced) = arguments.deform.of(&arguments.query, &answer)?.unzip();
     let mesh = answer.opened.session.view();
     let start = Instant::now();
@@ -58,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         slice.cell_edges(&mut edges);
     }
     let seconds = start.elapsed().as_secs_f64();
-    let values: Vec<Vec<f64>> = fields.iter().map(|field| slice.interpolate(&mesh, field)).collect();
+    let values: Vec<Vec<f64>> = views.into_iter().map(|field| slice.interpolate(&mesh, field)).collect();
     // The section with the plane, displaced.
     let positions = deformation.map_or_else(
         || slice.positions().to_vec(),

@@ -146,6 +146,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let vector = components.map(|f| info.fields[f].name.clone()).to_vec();
     let start = Instant::now();
     let fields = answer.all_values()?;
+    let views = answer.views(&fields)?;
     let mesh = answer.opened.session.view();
     let diagonal = mesh.bounds().diagonal();
     let options = TraceOptions {
@@ -165,7 +166,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         lines.add(trace(Direction::Forward, true), trace(Direction::Backward, false));
     }
     let seconds = start.elapsed().as_secs_f64();
-    let values = |f: usize| lines.points.iter().map(|p| p.place.interpolate(&mesh, &fields[f])).collect();
+    let values = |f: usize| lines.points.iter().map(|p| p.place.interpolate(&mesh, views[f])).collect();
     let columns: Vec<Vec<f64>> = (0..fields.len()).map(values).collect();
     let columns = answer.point_values(columns)?;
     let positions = lines.points.iter().map(|point| point.position).collect();

@@ -45,6 +45,7 @@ impl Shown {
         MeshView {
             positions: &self.positions,
             field: &self.values,
+            is_label: false,
             tets: &self.tets,
             neighbors: &self.neighbors,
         }

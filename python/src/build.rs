@@ -15,7 +15,7 @@ use tetralod::mesh::{self, MeshError, MeshFindings, RepairLevel, RepairReport, T
 use tetralod::mt::{AveragedField, MtKind};
 use tetralod_build::{
     BuildConfig, BuildCriterion, BuildError, BuildSummary, Construction, ConstructionChoice, FieldPrecision,
-    Method, Purpose, build_with,
+    Method, Purpose, build_with, mark_labels,
 };
 use tetralod_io::{
     CellData, FieldSelection, ReadError, ReadOptions, read_bytes_with, read_time_steps, read_with,
@@ -44,6 +44,7 @@ pub struct BuildOptions {
     all_fields: bool,
     cell_to_point: bool,
     mean_across_regions: bool,
+    labels: Vec<(String, bool)>,
     repair: Option<String>,
     weld_distance: Option<f64>,
     units: Vec<(String, String)>,
@@ -128,6 +129,7 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
         let (level, weld_distance) = (level.name(), level.weld_distance());
         (mesh, done.to_string(), Some(Repair { level, weld_distance, done, kept: found.to_string(), found }))
     };
+    mark_labels(&mut mesh, &options.labels, &config).map_err(|error| errors::build(&name, &error))?;
     let to_points = config.cells_to_points(options.cell_to_point, options.mean_across_regions);
     mesh.settle_cells(to_points, &config.preserve);
     mesh.add_geometry_fields(&config.fields);

@@ -36,6 +36,7 @@ struct FieldObject<'a> {
     unit: &'a str,
     time: Option<f64>,
     vector: Option<&'a VectorPart>,
+    is_label: bool,
     min: f64,
     max: f64,
     bits: u32,
@@ -107,7 +108,7 @@ fn exact_status(session: &Session, total: Option<u64>) -> ExactStatus {
 
 fn field<'a>(session: &Session, info: &'a MtInfo, index: usize) -> FieldObject<'a> {
     let field = &info.fields[index];
-    let FieldInfo { name, unit, time, vector, min, max, bits, extremes, averaged, .. } = field;
+    let FieldInfo { name, unit, time, vector, is_label, min, max, bits, extremes, averaged, .. } = field;
     let curve = session.bytes_by_error(index);
     let errors =
         curve.iter().map(|point| Some(point.error_in_units(field)).filter(|error| error.is_finite()));
@@ -117,6 +118,7 @@ fn field<'a>(session: &Session, info: &'a MtInfo, index: usize) -> FieldObject<'
         unit,
         time: *time,
         vector: vector.as_ref(),
+        is_label: *is_label,
         min: *min,
         max: *max,
         bits: *bits,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tetralod::mesh::NONE;
 use tetralod::session::Session;
 use tetralod::view::{
-    BoundarySurface, FieldStats, Histogram, IsoSurface, MeshView, NormalKind, Place, Plane, Probe, Slice,
+    BoundarySurface, FieldStats, FieldView, Histogram, IsoSurface, MeshView, NormalKind, Place, Plane, Probe, Slice,
     StreamPoint, TraceOptions, Tracer,
 };
 
@@ -20,6 +20,8 @@ pub struct Mesh {
     /// Of each tetrahedron, where the file has regions.
     regions: Vec<u32>,
     groups: Vec<Group>,
+    /// Of each field of the file, whether it is a label.
+    labels: Vec<bool>,
 }
 
 /// Fields that are one array: the components of a vector, or one scalar field.
@@ -65,6 +67,7 @@ impl Mesh {
             neighbors: Arc::new(mesh.neighbors().to_vec()),
             regions: mesh.regions().iter().map(|&region| region.into()).collect(),
             groups: groups.into_iter().map(group).collect(),
+            labels: info.fields.iter().map(|field| field.is_label).collect(),
         };
         Some(match shown {
             Some(shown) => whole.part(|t| shown.iter().any(|&region| u32::from(region) == whole.regions[t])),
@@ -94,6 +97,7 @@ impl Mesh {
             neighbors: Arc::new(kept.iter().map(|&t| self.neighbors[t].map(neighbor)).collect()),
             regions: kept.iter().map(|&t| self.regions[t]).collect(),
             groups: self.groups.iter().map(group).collect(),
+            labels: self.labels.clone(),
         }
     }
 
@@ -114,16 +118,19 @@ impl Mesh {
         MeshView {
             positions: &self.positions,
             field: self.values(field),
+            is_label: self.labels.get(field).copied().unwrap_or(false),
             tets: &self.tets,
             neighbors: &self.neighbors,
         }
     }
 
     /// An array for each group, of the values that `of` makes of those of a field.
-    fn arrays(&self, of: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Array> {
+    fn arrays(&self, of: impl Fn(FieldView<'_>) -> Vec<f64>) -> Vec<Array> {
         let array = |Group { fields, values }: &Group| {
-            let components = values.chunks_exact(self.positions.len().max(1));
-            Array::components(components.flat_map(&of).collect(), fields.len())
+            let components = fields.iter().zip(values.chunks_exact(self.positions.len().max(1)));
+            let views =
+                components.map(|(&field, values)| FieldView { values, is_label: self.labels[field] });
+            Array::components(views.flat_map(&of).collect(), fields.len())
         };
         self.groups.iter().map(array).collect()
     }
@@ -131,10 +138,10 @@ impl Mesh {
     /// The values at places; NaN where there is none.
     fn at<'a>(&self, places: impl Iterator<Item = &'a Option<Place>> + Clone) -> Vec<Array> {
         let view = self.view(0);
-        let value = |place: &Option<Place>, values: &[f64]| {
-            place.as_ref().map_or(f64::NAN, |place| place.interpolate(&view, values))
+        let value = |place: &Option<Place>, field: FieldView<'_>| {
+            place.as_ref().map_or(f64::NAN, |place| place.interpolate(&view, field))
         };
-        self.arrays(|values| places.clone().map(|place| value(place, values)).collect())
+        self.arrays(|field| places.clone().map(|place| value(place, field)).collect())
     }
 }
 
@@ -175,11 +182,11 @@ impl Mesh {
             surface.extract_all(&view, &values);
             let own = self.values(field).as_ptr();
             // Of its own field they are the isovalues, without rounding.
-            let arrays = self.arrays(|values| {
-                if values.as_ptr() == own {
+            let arrays = self.arrays(|field| {
+                if field.values.as_ptr() == own {
                     surface.values.clone()
                 } else {
-                    surface.interpolate(&view, values)
+                    surface.interpolate(&view, field)
                 }
             });
             let normals = Array::rows(surface.normals);
@@ -195,7 +202,7 @@ impl Mesh {
             slice.extract(&view, &Plane { normal, offset });
             let mut edges = Vec::new();
             slice.cell_edges(&mut edges);
-            let arrays = self.arrays(|values| slice.interpolate(&view, values));
+            let arrays = self.arrays(|field| slice.interpolate(&view, field));
             let (points, triangles) = (slice.positions().to_vec(), slice.indices().to_vec());
             ((Array::rows(points), Array::rows(triangles), arrays), Array::rows(edges))
         })
@@ -206,7 +213,7 @@ impl Mesh {
         py.detach(|| {
             let mut surface = BoundarySurface::new();
             surface.extract(&self.view(0));
-            let arrays = self.arrays(|values| surface.interpolate(values));
+            let arrays = self.arrays(|field| surface.interpolate(field.values));
             (Array::rows(surface.positions), Array::rows(surface.indices), arrays)
         })
     }

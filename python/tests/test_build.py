@@ -183,6 +183,42 @@ def test_the_report_is_that_of_the_command(folder):
     assert caught.value.code == "bad-source"
 
 
+def test_labels_at_points_are_those_of_most_volume_around(folder):
+    rng = np.random.default_rng(5)
+    grid = pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: hexahedra(5)}, grid_points(5) ** 2)
+    grid.cell_data["cluster_id"] = rng.integers(-3, 4, grid.n_cells, dtype=np.int32)
+    grid.cell_data["load"] = grid.cell_data["cluster_id"]
+    grid.save("cells.vtu")
+    corners = grid.cell_connectivity.reshape(-1, 8)
+    volumes = np.abs(grid.compute_cell_sizes()["Volume"])
+    labels = np.unique(grid.cell_data["cluster_id"])
+    around = np.zeros((grid.n_points, len(labels)))
+    which = np.searchsorted(labels, grid.cell_data["cluster_id"])
+    np.add.at(around, (corners, which[:, None]), volumes[:, None])
+    most = around.max(axis=1, keepdims=True)
+    expected = labels[(around >= most * (1 - 1e-12)).argmax(axis=1)]
+    clear = (around > most * (1 - 1e-9)).sum(axis=1) == 1
+    mt = tetralod.build("cells.vtu", cell_to_point=True, all_fields=True, labels={"load": False}, output="labels.mt")
+    assert [field.is_label for field in mt.info.fields] == [True, False]
+    assert mt.info.fields[mt.info.first_field].name == "load"
+    mesh = mt.refine(error=0)
+    found, wanted = np.lexsort(mesh.points.T), np.lexsort(grid.points.T)
+    assert np.array_equal(mesh.point_data["cluster_id"][found][clear[wanted]], expected[wanted][clear[wanted]])
+    assert clear.sum() > 40
+    # Between points there is no other label, and that of a point beside it.
+    places = rng.random((500, 3))
+    values = mesh.probe(places)
+    assert set(values["cluster_id"]) <= set(labels.tolist())
+    assert len(set(values["load"])) > 100
+    near = mesh.points + 1e-4 * (0.5 - mesh.points)
+    assert np.array_equal(mesh.probe(near)["cluster_id"], mesh.point_data["cluster_id"])
+    assert bytes_of(mt) == built_by_command("cells.vtu", "--cell-to-point", "--all-fields", "--no-label", "load")
+    for wrong in ({"nothing": True}, ["load"], {"load": 1}):
+        with pytest.raises(tetralod.TetralodError) as caught:
+            tetralod.build("cells.vtu", cell_to_point=True, labels=wrong)
+        assert caught.value.code == "bad-option"
+
+
 def test_time_steps_are_one_field(folder):
     points, cells = grid_points(4), {12: hexahedra(4)}
     for number in range(2):

@@ -31,6 +31,7 @@ def build(
     all_fields: bool = False,
     cell_to_point: bool = False,
     mean_across_regions: bool = False,
+    labels: Mapping[str, bool] | None = None,
     units: Mapping[str, str] | None = None,
     metadata: Mapping[str, str] | None = None,
     step: int | None = None,
@@ -77,10 +78,13 @@ def build(
         The fields to keep, or vectors with all components; or all. By default the first that neither numbers something nor says where it is;
         of a vector its length.
     ``cell_to_point``
-        Turns fields at cells into fields at points, the mean of the cells around; ``report["averaged"]`` says what that does. With
-        ``preserve``, where regions meet, a point gets a value for each of them, from the cells of that region alone.
+        Turns fields at cells into fields at points, the mean of the cells around, of labels the most frequent one; ``report["averaged"]``
+        says what that does. With ``preserve``, where regions meet, a point gets a value for each of them, from the cells of that region alone.
     ``mean_across_regions``
-        Gives such points one value instead, the mean of the cells of all regions.
+        Gives such points one value instead, of the cells of all regions.
+    ``labels``
+        Which fields are labels, by their names: whole numbers with nothing between two of them, shown by the nearest point; or, with ``False``,
+        are not. By default integers of at most 256 different values whose name says that they number something.
     ``units``, ``metadata``
         Units of fields or vectors by their names; entries for the file.
     ``step``
@@ -131,6 +135,7 @@ def build(
         "all_fields": all_fields,
         "cell_to_point": cell_to_point,
         "mean_across_regions": mean_across_regions,
+        "labels": _labels(labels),
         "repair": repair,
         "weld_distance": None if weld_distance is None else _options.amount("weld_distance", weld_distance),
         "units": list((units or {}).items()),
@@ -182,6 +187,15 @@ def _precision(bits: Any, tolerance: Any) -> list[tuple[str | None, str, float]]
         unit = "fraction" if isinstance(value, str) else "units"
         found.append((name, unit, _options.tolerance(place, value, 1.0)))
     return found
+
+
+def _labels(labels: Any) -> list[tuple[str, bool]]:
+    """Which fields are labels, and which are not."""
+    if labels is None:
+        return []
+    if not isinstance(labels, Mapping) or not all(isinstance(is_label, bool) for is_label in labels.values()):
+        raise bad_option("labels", f"must be a mapping of names to True or False; given: {labels!r}")
+    return [(str(name), is_label) for name, is_label in labels.items()]
 
 
 def _by_name(value: Any) -> list[tuple[str | None, Any]]:

@@ -35,6 +35,8 @@ class Field:
     time: float | None
     """The time that its values are of, if it is known. Time steps of one field are fields of one name."""
     vector: VectorPart | None
+    is_label: bool
+    """Whether it is a label: whole numbers with nothing between two of them; a place has that of the nearest corner."""
     min: float
     """The smallest value over all time steps, and with ``max`` the range that errors in % are of."""
     max: float
@@ -103,8 +105,8 @@ class Info:
     """The box around the reference mesh, which all meshes are in: x0, y0, z0, x1, y1, z1 in model units."""
     fields: tuple[Field, ...]
     first_field: int
-    """The field that is meant where none is named: the first that varies, is no component of a vector, and, by its name, neither numbers
-    something nor says where it is."""
+    """The field that is meant where none is named: the first that varies, is no label, no component of a vector, and, by its name, neither
+    numbers something nor says where it is."""
     regions: Regions | None
     """``None`` if the file was built without ``preserve``."""
     surface_first: bool | None

@@ -56,7 +56,7 @@ impl TetMesh {
     }
 
     /// Turns the fields at cells that have values into fields at points: the mean of the cells around a point, weighted
-    /// by volume. A name that a field at points has already gets `_cells` behind it. What that has done to the values is in
+    /// by volume; of [labels](Field::is_label) the one that has most of this volume, the least of several. A name that a field at points has already gets `_cells` behind it. What that has done to the values is in
     /// [`Field::averaged`].
     ///
     /// Points without cells get 0; [`repair`](crate::mesh::repair) drops them, and turns cells whose volume would
@@ -83,11 +83,14 @@ impl TetMesh {
         let key = |field: &Field| (field.name.clone(), field.time.map(bits_of));
         let mut taken: HashSet<_> = self.fields.iter().map(key).collect();
         for mut field in read {
-            let mut means = self.mean_of_cells(&field.values, &volumes, &parting);
-            field.averaged = self.averaged(&field.values, &means, &volumes, &parting);
-            field.sides = means.split_off(self.positions.len());
-            field.values = means;
-            field.integer = false;
+            let mut values = match field.is_label {
+                true => self.label_of_cells(&field.values, &volumes, &parting),
+                false => self.mean_of_cells(&field.values, &volumes, &parting),
+            };
+            field.averaged = self.averaged(&field, &values, &volumes, &parting);
+            field.sides = values.split_off(self.positions.len());
+            field.values = values;
+            field.integer = field.is_label;
             while !taken.insert(key(&field)) {
                 field.name.push_str("_cells");
                 field.vector = None;
@@ -131,13 +134,9 @@ impl TetMesh {
     fn mean_of_cells(&self, values: &[f64], volumes: &[f64], parting: &Parting) -> Vec<f64> {
         let mut means = vec![0.0; self.positions.len() + parting.sides.len()];
         let mut weights = vec![0.0; means.len()];
-        for cell in self.cells() {
-            let (value, volume) = (values[cell.start], volumes[cell.clone()].iter().sum::<f64>());
-            let region = parting.regions[cell.start];
-            let mut corners: Vec<u32> = self.tets[cell].as_flattened().to_vec();
-            corners.sort_unstable();
-            corners.dedup();
-            for v in corners.into_iter().map(|v| parting.place(v, region)) {
+        for (cell, places) in self.cells_with_places(parting) {
+            let (value, volume) = (values[cell.start], volumes[cell].iter().sum::<f64>());
+            for v in places {
                 weights[v] += volume;
                 // A running mean stays between the values that it is of: no sum that could overflow.
                 if weights[v] > 0.0 {
@@ -149,27 +148,56 @@ impl TetMesh {
         means
     }
 
-    /// What averaging has done: `values` of cells have become `means` at points, and in further regions.
+    /// The label at each point that has most volume of the cells around it, the least of several; 0 at points without cells. Then those in
+    /// further regions.
+    fn label_of_cells(&self, values: &[f64], volumes: &[f64], parting: &Parting) -> Vec<f64> {
+        // The volume of each label at each point, labels in ascending order.
+        let mut around: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.positions.len() + parting.sides.len()];
+        for (cell, places) in self.cells_with_places(parting) {
+            // 0 and -0 are one label.
+            let (value, volume) = (values[cell.start] + 0.0, volumes[cell].iter().sum::<f64>());
+            for v in places {
+                let known = &mut around[v];
+                match known.binary_search_by(|(label, _)| label.total_cmp(&value)) {
+                    Ok(at) => known[at].1 += volume,
+                    Err(at) => known.insert(at, (value, volume)),
+                }
+            }
+        }
+        let most = |labels: Vec<(f64, f64)>| {
+            let better = |best: (f64, f64), next: (f64, f64)| if next.1 > best.1 { next } else { best };
+            labels.into_iter().reduce(better).map_or(0.0, |(label, _)| label)
+        };
+        around.into_iter().map(most).collect()
+    }
+
+    /// What averaging has done: the values of a field of cells have become `means` at points, and in further regions.
     fn averaged(
         &self,
-        values: &[f64],
+        field: &Field,
         means: &[f64],
         volumes: &[f64],
         parting: &Parting,
     ) -> Option<Averaged> {
+        let values = &field.values;
         let mut ends: Option<[Range<usize>; 2]> = None;
         let (mut largest, mut squares, mut whole) = (0.0_f64, 0.0, 0.0);
         for cell in self.cells() {
             let value = values[cell.start];
             let region = parting.regions[cell.start];
             let (mut volume, mut mean) = (0.0, 0.0);
+            // Of labels, how much of the cell has another one: a quarter of a tetrahedron is nearest to each corner.
+            let at = |v: u32| {
+                let mean = means[parting.place(v, region)];
+                if field.is_label { f64::from(mean != value) } else { mean }
+            };
             for t in cell.clone() {
                 volume += volumes[t];
                 let share = volumes[t] / volume;
-                let of_tet: f64 = self.tets[t].iter().map(|&v| 0.25 * means[parting.place(v, region)]).sum();
+                let of_tet: f64 = self.tets[t].iter().map(|&v| 0.25 * at(v)).sum();
                 mean = mean * (1.0 - share) + of_tet * share;
             }
-            let difference = (mean - value).abs();
+            let difference = if field.is_label { mean } else { (mean - value).abs() };
             // In units of the largest one so far, no square overflows.
             if difference > largest {
                 squares *= (largest / difference) * (largest / difference);
@@ -202,6 +230,20 @@ impl TetMesh {
                 end += 1;
             }
             (start < self.tets.len()).then_some(start..end)
+        })
+    }
+
+    /// The tetrahedra of each cell of the input, and the places of the values of its corners, each once.
+    fn cells_with_places(
+        &self,
+        parting: &Parting,
+    ) -> impl Iterator<Item = (Range<usize>, impl Iterator<Item = usize>)> {
+        self.cells().map(|cell| {
+            let region = parting.regions[cell.start];
+            let mut corners: Vec<u32> = self.tets[cell.clone()].as_flattened().to_vec();
+            corners.sort_unstable();
+            corners.dedup();
+            (cell, corners.into_iter().map(move |v| parting.place(v, region)))
         })
     }
 
@@ -367,5 +409,38 @@ mod tests {
         assert_eq!(mesh.fields[1].name, "m_cells");
         assert!(mesh.fields[1].values.iter().all(|v| (v / f64::MAX - 1.0).abs() < 1e-12));
         assert_eq!(mesh.cell_fields.len(), 1);
+    }
+
+    #[test]
+    fn points_get_the_label_that_has_most_volume_around_them() {
+        // Three tetrahedra around one edge, of volumes 1, 1 and 3: the two that are alike have less.
+        let positions = vec![
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [-1.0, 0.0, 0.0],
+            [0.0, -3.0, 0.0],
+        ];
+        let label = |values: Vec<f64>| Field { integer: true, is_label: true, ..Field::new("id", values) };
+        let mut mesh = TetMesh {
+            positions,
+            tets: vec![[0, 2, 3, 1], [0, 3, 4, 1], [0, 4, 5, 1]],
+            cell_fields: vec![label(vec![2.0, 2.0, 7.0]), label(vec![9.0, 4.0, -0.0])],
+            ..TetMesh::default()
+        };
+        mesh.cell_fields[1].name = "other".to_owned();
+        mesh.cells_to_points();
+        assert_eq!(mesh.fields[0].values, [7.0, 7.0, 2.0, 2.0, 7.0, 7.0]);
+        // Of equal volumes it is the least one.
+        assert_eq!(mesh.fields[1].values, [0.0, 0.0, 9.0, 4.0, 0.0, 0.0]);
+        assert!(mesh.fields.iter().all(|field| field.is_label && field.integer));
+        // Two, three and no corners of the cells have another label.
+        let [shares, volume] = [[0.5, 0.75, 0.0], [1.0, 1.0, 3.0]];
+        let squares: f64 = (0..3).map(|t| volume[t] * shares[t] * shares[t]).sum();
+        let found = mesh.fields[0].averaged.as_ref().expect("it was averaged");
+        assert_eq!(found.difference.largest, 0.75);
+        assert!((found.difference.rms - (squares / 5.0).sqrt()).abs() < 1e-15);
+        assert_eq!((found.input.min.value, found.input.max.value), (2.0, 7.0));
     }
 }

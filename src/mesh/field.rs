@@ -2,6 +2,10 @@
 
 use crate::mesh::Averaged;
 use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// Most different values of a field that is a label though nobody says so.
+pub const MOST_LABELS: usize = 256;
 
 /// A scalar field with one value per point (or per tetrahedron), and what is known of it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,6 +25,10 @@ pub struct Field {
     pub time: Option<f64>,
     /// Whether the values are integers by the type that the file gave them.
     pub integer: bool,
+    /// Whether it is a label: whole numbers that say what something is, as materials or clusters are numbered, so that there is nothing between
+    /// two of them. What is at a place is the label of the nearest corner, not what is linear between the corners. Readers leave it to
+    /// [`TetMesh::mark_labels`](crate::mesh::TetMesh::mark_labels).
+    pub is_label: bool,
     /// What averaging has done to it, if the input has its values at cells.
     pub averaged: Option<Averaged>,
 }
@@ -34,7 +42,7 @@ impl Field {
     /// What is known of it, but for its values.
     #[doc(hidden)]
     pub fn without_values(&self) -> Self {
-        let Self { name, unit, vector, time, integer, averaged, .. } = self;
+        let Self { name, unit, vector, time, integer, is_label, averaged, .. } = self;
         let (name, unit, vector) = (name.clone(), unit.clone(), vector.clone());
         Self {
             name,
@@ -44,6 +52,7 @@ impl Field {
             vector,
             time: *time,
             integer: *integer,
+            is_label: *is_label,
             averaged: averaged.clone(),
         }
     }
@@ -52,6 +61,20 @@ impl Field {
     #[doc(hidden)]
     pub fn all_values(&self) -> impl Iterator<Item = &f64> {
         self.values.iter().chain(&self.sides)
+    }
+
+    /// Whether it is a label where nobody says so: it is no part of a vector, its values are integers by their type, no more than
+    /// [`MOST_LABELS`] different ones and all closer to 0 than 2^23, and its name says that they number something, as `material` does.
+    pub fn is_label_by_rule(&self) -> bool {
+        const END: f64 = (1 << 23) as f64;
+        self.integer && self.vector.is_none() && has_word(&self.name, &NUMBERS) && {
+            let mut known = BTreeSet::new();
+            let mut last = None;
+            self.values.iter().all(|&value| {
+                let is_new = last.replace(value) != Some(value) && known.insert(value as i64);
+                value.fract() == 0.0 && value.abs() < END && (!is_new || known.len() <= MOST_LABELS)
+            })
+        }
     }
 
     /// Whether a user who asks for `name` means this field: it has this name, or it is a component (not the length) of
@@ -75,14 +98,16 @@ pub struct VectorPart {
 /// Where among fields that one is which is kept where none is asked for: the first that is no label, does not number something or say where
 /// it is, and is no component; else the first.
 pub fn default_field(fields: &[Field], labels: &[String]) -> Option<usize> {
-    let tells = |field: &Field| !is_number_or_place(&field.name) && !labels.contains(&field.name);
+    let tells = |field: &Field| {
+        !field.is_label && !is_number_or_place(&field.name) && !labels.contains(&field.name)
+    };
     let is_whole = |field: &Field| field.vector.as_ref().is_none_or(|part| part.component.is_none());
     let first = |wanted: &dyn Fn(&Field) -> bool| fields.iter().position(wanted);
     first(&|field| tells(field) && is_whole(field)).or_else(|| first(&tells)).or_else(|| first(&|_| true))
 }
 
-/// Words in the names of arrays that number something or say where it is, as the usual programs write them.
-const NUMBERS_AND_PLACES: [&str; 23] = [
+/// Words in the names of arrays that number something, as the usual programs write them.
+const NUMBERS: [&str; 20] = [
     "id",
     "ids",
     "index",
@@ -103,18 +128,23 @@ const NUMBERS_AND_PLACES: [&str; 23] = [
     "tag",
     "rank",
     "proc",
-    "coordinates",
-    "coords",
-    "coord",
 ];
+
+/// Words in the names of arrays that say where something is.
+const PLACES: [&str; 3] = ["coordinates", "coords", "coord"];
 
 /// Words in the names of quantities that have one of these words, too, such as a Mach number, or the real part of a pressure.
 const OF_QUANTITIES: [&str; 9] =
     ["mach", "reynolds", "courant", "peclet", "prandtl", "nusselt", "real", "imaginary", "imag"];
 
-/// Whether the name of an array says that it numbers something, or where it is: that is seldom what is to be looked at. Words of names end at
-/// signs, and where a large letter follows a small one.
+/// Whether the name of an array says that it numbers something, or where it is: that is seldom what is to be looked at.
 pub fn is_number_or_place(name: &str) -> bool {
+    has_word(name, &NUMBERS) || has_word(name, &PLACES)
+}
+
+/// Whether a name has one of these words, and is not that of a quantity. Words of names end at signs, and where a large letter follows a small
+/// one.
+fn has_word(name: &str, known: &[&str]) -> bool {
     // The words are English: of other letters it is enough that they are some.
     let is_letter = |c: char| c.is_ascii_alphabetic() || !c.is_ascii();
     let mut words = vec![String::new()];
@@ -129,12 +159,12 @@ pub fn is_number_or_place(name: &str) -> bool {
         before = c;
     }
     let is_one_of = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
-    is_one_of(&NUMBERS_AND_PLACES) && !is_one_of(&OF_QUANTITIES)
+    is_one_of(known) && !is_one_of(&OF_QUANTITIES)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::is_number_or_place;
+    use super::{Field, VectorPart, is_number_or_place};
 
     #[test]
     fn numbers_and_places_are_told_by_the_words_of_a_name() {
@@ -153,5 +183,23 @@ mod tests {
         {
             assert!(!is_number_or_place(name), "{name}");
         }
+    }
+
+    #[test]
+    fn labels_are_few_integers_that_number_something() {
+        let of = |name: &str, values: Vec<f64>| Field { integer: true, ..Field::new(name, values) };
+        let many = |count: u32| (0..count).map(f64::from).collect::<Vec<_>>();
+        assert!(of("material", vec![1.0, 5.0, 5.0, -3.0]).is_label_by_rule());
+        assert!(of("cell_id", [many(256), many(256)].concat()).is_label_by_rule());
+        // Too many, no integers by type or value, a measured quantity, a place, a part of a vector.
+        assert!(!of("cell_id", many(257)).is_label_by_rule());
+        assert!(!Field::new("material", vec![1.0]).is_label_by_rule());
+        assert!(!of("material", vec![1.5]).is_label_by_rule());
+        assert!(!of("material", vec![f64::from(1 << 23)]).is_label_by_rule());
+        assert!(!of("Hounsfield", vec![1.0, 5.0]).is_label_by_rule());
+        assert!(!of("coords", vec![1.0, 5.0]).is_label_by_rule());
+        assert!(!of("mach_number", vec![1.0]).is_label_by_rule());
+        let part = VectorPart { name: "id".to_owned(), component: Some(0) };
+        assert!(!Field { vector: Some(part), ..of("id_x", vec![1.0]) }.is_label_by_rule());
     }
 }

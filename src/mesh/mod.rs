@@ -38,7 +38,7 @@ pub use extremes::{Averaged, Extreme};
 pub use extremes::{Difference, Extremes};
 pub use field::{Field, VectorPart};
 #[doc(hidden)]
-pub use field::{default_field, is_number_or_place};
+pub use field::{MOST_LABELS, default_field, is_number_or_place};
 #[doc(hidden)]
 pub use geometry_field::GeometryField;
 #[doc(hidden)]

@@ -3,6 +3,7 @@
 use crate::mesh::Field;
 use crate::mesh::MeshInput;
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 /// The regular grid that a mesh was split from; its points run x fastest, then y, then z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,6 +79,31 @@ impl TetMesh {
             if !found {
                 return Err(named);
             }
+        }
+        Ok(())
+    }
+
+    /// Says which fields, at points and at cells, are [labels](Field::is_label): of those that `given` names, or whose vector it names, the
+    /// first entry says it; of others the [rule](Field::is_label_by_rule), at all time steps, or none are if `by_rule` is not set.
+    ///
+    /// # Errors
+    /// The first name that the input does not have.
+    #[doc(hidden)]
+    pub fn mark_labels<'a>(&mut self, given: &'a [(String, bool)], by_rule: bool) -> Result<(), &'a str> {
+        let MeshInput { other_fields, other_cell_fields, .. } = &self.input;
+        let known =
+            || self.fields.iter().chain(&self.cell_fields).chain(other_fields).chain(other_cell_fields);
+        if let Some((name, _)) = given.iter().find(|(name, _)| !known().any(|field| field.answers_to(name))) {
+            return Err(name);
+        }
+        for fields in [&mut self.fields, &mut self.cell_fields] {
+            for field in fields.iter_mut() {
+                let said = given.iter().find(|(name, _)| field.answers_to(name));
+                field.is_label = said.map_or_else(|| by_rule && field.is_label_by_rule(), |(_, is_label)| *is_label);
+            }
+            let none: HashSet<String> =
+                fields.iter().filter(|field| !field.is_label).map(|field| field.name.clone()).collect();
+            fields.iter_mut().for_each(|field| field.is_label &= !none.contains(&field.name));
         }
         Ok(())
     }

@@ -63,6 +63,8 @@ pub struct FieldInfo {
     pub unit: String,
     /// Which part of a vector or tensor the field is, if it is one.
     pub vector: Option<VectorPart>,
+    /// Whether it is a label, whose values are whole numbers with nothing in between: a place has the label of the nearest corner.
+    pub is_label: bool,
     /// The time that the values are of, if it is known.
     pub time: Option<f64>,
     /// The largest difference between the input's value at a reference vertex and that of the reference mesh where the input has the
@@ -87,6 +89,7 @@ impl Default for FieldInfo {
             bits: 1,
             unit: String::new(),
             vector: None,
+            is_label: false,
             time: None,
             quantization: 0.0,
             extremes: None,
@@ -164,11 +167,14 @@ pub struct AveragedField {
     /// The time that its values are of, if it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
+    /// Whether it is a label.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_label: bool,
     /// The smallest and the largest value that the input has at cells.
     pub input: Extremes,
     /// The smallest and the largest value at points.
     pub points: Extremes,
-    /// How far the field at points is from the values at cells.
+    /// How far the field at points is from the values at cells; of labels, how much of cells has another one.
     pub difference: Difference,
 }
 
@@ -177,8 +183,8 @@ impl MtInfo {
     pub fn averaged_fields(&self) -> Vec<AveragedField> {
         let of = |field: &FieldInfo| {
             let Averaged { input, difference } = field.averaged.clone()?;
-            let FieldInfo { name, unit, time, extremes, .. } = field.clone();
-            Some(AveragedField { name, unit, time, input, points: extremes?, difference })
+            let FieldInfo { name, unit, time, is_label, extremes, .. } = field.clone();
+            Some(AveragedField { name, unit, time, is_label, input, points: extremes?, difference })
         };
         self.fields.iter().filter_map(of).collect()
     }
@@ -225,13 +231,13 @@ impl MtInfo {
         steps().find(|&step| self.fields[step].time == time).or_else(|| steps().next())
     }
 
-    /// The field that is shown where none is asked for: the first that varies, is no component of a vector, and neither numbers something nor
-    /// says where it is, by its name; if all are that, the first that varies. 0 if none does.
+    /// The field that is shown where none is asked for: the first that varies, is no label, no component of a vector, and neither numbers
+    /// something nor says where it is, by its name; if all are that, the first that varies. 0 if none does.
     pub fn first_field(&self) -> usize {
         let varies = |field: &FieldInfo| field.max > field.min;
         let tells = |field: &FieldInfo| {
             let is_component = field.vector.as_ref().is_some_and(|part| part.component.is_some());
-            varies(field) && !is_component && !is_number_or_place(&field.name)
+            varies(field) && !is_component && !field.is_label && !is_number_or_place(&field.name)
         };
         let first = |wanted: &dyn Fn(&FieldInfo) -> bool| self.fields.iter().position(wanted);
         first(&tells).or_else(|| first(&varies)).unwrap_or(0)

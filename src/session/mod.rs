@@ -52,7 +52,7 @@ use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTes
 use crate::refine::{
     Criterion, Front, LodCriterion, Need, Outcome, Part, RefineStats, Request, RequestError,
 };
-use crate::view::{IsoSurface, MeshView, MeshWithin, NormalKind, Plane, Slice, SurfaceChanges};
+use crate::view::{FieldView, IsoSurface, MeshView, MeshWithin, NormalKind, Plane, Slice, SurfaceChanges};
 use behind::Behind;
 use block_state::Blocks;
 use depths::Depths;
@@ -119,6 +119,8 @@ pub struct Session {
 struct Shown {
     positions: Vec<[f64; 3]>,
     values: Vec<f64>,
+    /// Whether these are labels.
+    is_label: bool,
     /// Another field is to be shown: all values are to be set.
     stale: bool,
     tets: ShownTets,
@@ -420,7 +422,10 @@ impl Session {
         let values = self.values_of_mesh(field);
         match (&self.shown.cut, self.shown.tets.cut()) {
             (Some((cut, _)), Some(by)) if by.field == field => cut.values().to_vec(),
-            (Some((cut, _)), _) if !values.is_empty() => cut.interpolate(&values),
+            (Some((cut, _)), _) if !values.is_empty() => {
+                let is_label = self.info().is_some_and(|info| info.fields[field].is_label);
+                cut.interpolate(FieldView { values: &values, is_label })
+            }
             _ => values,
         }
     }
@@ -538,6 +543,7 @@ impl Session {
         let slots = mesh.positions().len();
         shown.positions.resize(slots, [0.0; 3]);
         shown.values.resize(slots, 0.0);
+        shown.is_label = field.is_label;
         let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]);
         let is_same = changes.vertices.is_empty() && changes.tets.is_empty() && !shown.stale;
         self.behind.add(&changes, shown.stale);
@@ -565,7 +571,7 @@ impl Session {
             return;
         }
         let cut = MeshWithin::of(&whole, &by, range);
-        let values = if field == self.field { cut.values().to_vec() } else { cut.interpolate(whole.field) };
+        let values = if field == self.field { cut.values().to_vec() } else { cut.interpolate(whole.own_field()) };
         let MeshView { positions, tets, .. } = cut.view(&values);
         let tets = std::iter::once(0..tets.len() as u32).collect();
         let all = MeshChanges { tets, ..MeshChanges::of_all_vertices(positions.len()) };
@@ -577,11 +583,12 @@ impl Session {
 
 fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
     if let Some((cut, values)) = &shown.cut {
-        return cut.view(values);
+        return cut.view(FieldView { values, is_label: shown.is_label });
     }
     let all = front.map_or([&[][..]; 2], |front| [front.mesh().tets(), front.mesh().neighbors()]);
     let [tets, neighbors] = shown.tets.tets().unwrap_or(all);
-    MeshView { positions: &shown.positions, field: &shown.values, tets, neighbors }
+    let Shown { positions, values: field, is_label, .. } = shown;
+    MeshView { positions, field, is_label: *is_label, tets, neighbors }
 }
 
 /// A pixel and a colour of which an excess is a meaningful multiple.

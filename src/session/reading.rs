@@ -25,7 +25,7 @@ pub struct Reading {
 
 impl Session {
     /// What is known of the current mesh at a point, in model units; none outside, and where it is not
-    /// finite. Fields are linear in the tetrahedron.
+    /// finite. Fields are linear in the tetrahedron; of a label it is that of the nearest corner.
     ///
     /// # Errors
     /// If nothing has arrived yet.
@@ -43,8 +43,8 @@ impl Session {
         let Some(place) = cut.unwrap_or(Some(place)) else { return Ok(None) };
         let Some(tet) = mesh.tet(place.tet) else { return Ok(None) };
         let value = |field: usize| {
-            let at = |i: usize| place.weights[i] * info.fields[field].value(mesh.levels(tet[i])[field]);
-            (0..4).map(at).sum::<f64>()
+            let corners = tet.map(|slot| info.fields[field].value(mesh.levels(slot)[field]));
+            if info.fields[field].is_label { place.nearest(corners) } else { place.linear(corners) }
         };
         Ok(Some(Reading {
             position: point,

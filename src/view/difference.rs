@@ -73,7 +73,7 @@ impl Difference {
             };
             values.push(own - there);
         }
-        let stats = FieldStats::of(&MeshView { field: &values, ..*mesh });
+        let stats = FieldStats::of(&MeshView { field: &values, is_label: false, ..*mesh });
         // Both are over the same volume, so their squares add up.
         let square = stats.mean() * stats.mean() + stats.deviation() * stats.deviation();
         let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));

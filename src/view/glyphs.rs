@@ -3,7 +3,7 @@
 use crate::geom::Bounds;
 use crate::mesh::NONE;
 use crate::view::solids::{Frame, MOST_SIDES};
-use crate::view::{MeshView, Place, Probe, Solids};
+use crate::view::{FieldView, MeshView, Place, Probe, Solids};
 use glam::DVec3;
 
 /// Most points of the grid, inside of the mesh or not.
@@ -55,8 +55,8 @@ struct Arrow {
 
 impl Solids {
     /// Replaces the triangles by arrows of a vector field, given by its components along x, y and z, one
-    /// number a point each. Gives the number of arrows. They are coloured by `field`, one number a point, or
-    /// by the magnitude of the vector.
+    /// number a point each. Gives the number of arrows. They are coloured by `field`, or by the magnitude of the
+    /// vector.
     ///
     /// The grid lies in the middle of the box around the mesh; its points inside of the mesh have an arrow,
     /// which has the point in its middle. Where the vector is zero or not finite there is none. A spacing
@@ -69,12 +69,12 @@ impl Solids {
         &mut self,
         mesh: MeshView<'_>,
         vectors: [&[f64]; 3],
-        field: Option<&[f64]>,
+        field: Option<FieldView<'_>>,
         options: &ArrowOptions,
     ) -> usize {
         self.clear();
         let points = mesh.positions.len();
-        let is_complete = vectors.into_iter().chain(field).all(|numbers| numbers.len() >= points);
+        let is_complete = vectors.into_iter().chain(field.map(|field| field.values)).all(|numbers| numbers.len() >= points);
         let is_usable = options.spacing > 0.0 && options.spacing.is_finite();
         if !(is_complete && is_usable) {
             return 0;
@@ -146,7 +146,7 @@ fn grid(mesh: &MeshView<'_>, mut spacing: f64) -> Option<(f64, Vec<[f64; 3]>)> {
 fn arrow(
     mesh: &MeshView<'_>,
     vectors: [&[f64]; 3],
-    field: Option<&[f64]>,
+    field: Option<FieldView<'_>>,
     (p, place): ([f64; 3], Place),
 ) -> Option<Arrow> {
     let vector = DVec3::from(vectors.map(|component| place.interpolate(mesh, component)));

@@ -99,6 +99,8 @@ pub struct MeshView<'a> {
     pub positions: &'a [[f64; 3]],
     /// One field value per point, in the field's own units.
     pub field: &'a [f64],
+    /// Whether the field is a [label](crate::mesh::Field::is_label).
+    pub is_label: bool,
     /// Positive tetrahedra as indices into `positions`.
     pub tets: &'a [[u32; 4]],
     /// `neighbors[t][i]` is the tetrahedron across face `i` (opposite vertex `i`) of `t`, or
@@ -106,7 +108,35 @@ pub struct MeshView<'a> {
     pub neighbors: &'a [[u32; 4]],
 }
 
-impl MeshView<'_> {
+/// A field as slices: one number a point, and what it is between the points.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldView<'a> {
+    /// One value per point.
+    pub values: &'a [f64],
+    /// Whether it is a [label](crate::mesh::Field::is_label): each place has that of the nearest point. Other fields are linear.
+    pub is_label: bool,
+}
+
+impl<'a> From<&'a [f64]> for FieldView<'a> {
+    /// A field that is no label.
+    fn from(values: &'a [f64]) -> Self {
+        Self { values, is_label: false }
+    }
+}
+
+impl<'a> From<&'a Vec<f64>> for FieldView<'a> {
+    /// A field that is no label.
+    fn from(values: &'a Vec<f64>) -> Self {
+        Self { values, is_label: false }
+    }
+}
+
+impl<'a> MeshView<'a> {
+    /// The mesh's own field.
+    pub fn own_field(&self) -> FieldView<'a> {
+        FieldView { values: self.field, is_label: self.is_label }
+    }
+
     /// The box around all points.
     pub fn bounds(&self) -> Bounds {
         self.positions.iter().fold(Bounds::EMPTY, |bounds, p| bounds.with(*p))

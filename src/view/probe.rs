@@ -10,7 +10,7 @@
 
 use crate::geom::{Bounds, Groups};
 use crate::mesh::{FACES, NONE};
-use crate::view::MeshView;
+use crate::view::{FieldView, MeshView};
 use glam::DVec3;
 use robust::Coord3D;
 
@@ -43,12 +43,12 @@ pub struct Place {
 }
 
 impl Place {
-    /// The value of the mesh's own field.
+    /// The value of the mesh's own field; of a label that of the corner with the largest coordinate.
     ///
     /// # Panics
     /// If the mesh has no such tetrahedron.
     pub fn value(&self, mesh: &MeshView<'_>) -> f64 {
-        self.interpolate(mesh, mesh.field)
+        self.interpolate(mesh, mesh.own_field())
     }
 
     /// Where in the model it is.
@@ -60,13 +60,26 @@ impl Place {
         [0, 1, 2].map(|axis| (0..4).map(|i| self.weights[i] * corners[i][axis]).sum())
     }
 
-    /// The value of any field, given by one number a point.
+    /// The value of any field; of a label that of the corner with the largest coordinate, the least of several.
     ///
     /// # Panics
     /// If the mesh has no such tetrahedron, or the field too few numbers.
-    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> f64 {
-        let values = mesh.tets[self.tet as usize].map(|p| field[p as usize]);
+    pub fn interpolate<'f>(&self, mesh: &MeshView<'_>, field: impl Into<FieldView<'f>>) -> f64 {
+        let FieldView { values, is_label } = field.into();
+        let values = mesh.tets[self.tet as usize].map(|p| values[p as usize]);
+        if is_label { self.nearest(values) } else { self.linear(values) }
+    }
+
+    /// What is linear between values at the corners.
+    pub(crate) fn linear(&self, values: [f64; 4]) -> f64 {
         (0..4).map(|i| self.weights[i] * values[i]).sum()
+    }
+
+    /// Of labels at the corners that of the nearest one, by barycentric coordinates; the least of several.
+    pub(crate) fn nearest(&self, labels: [f64; 4]) -> f64 {
+        let largest = self.weights.iter().fold(0.0, |most: f64, weight| most.max(*weight));
+        let nearest = (0..4).filter(|&i| self.weights[i] >= largest).map(|i| labels[i]);
+        nearest.fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -11,7 +11,7 @@
 
 use super::marching::{Crossing, Pieces, Polygon, select};
 use super::mesh_snapshot::{MeshSnapshot, entries};
-use super::{MeshView, SurfaceChanges};
+use super::{FieldView, MeshView, SurfaceChanges};
 use crate::mesh::{FACES, NONE};
 use std::ops::Range;
 
@@ -43,7 +43,7 @@ impl Plane {
     /// The position of a vertex and the field's value there.
     fn vertex(&self, mesh: &MeshView<'_>, crossing: &Crossing) -> ([f64; 3], f64) {
         let t = crossing.fraction(0.0, |p| self.height_at(mesh, p));
-        (crossing.place(mesh.positions, t), crossing.value(mesh.field, t))
+        (crossing.place(mesh.positions, t), crossing.value(mesh.own_field(), t))
     }
 }
 
@@ -79,12 +79,13 @@ impl Slice {
         &self.values
     }
 
-    /// The value at each vertex of another field of the mesh that was sliced, given by one number a point.
+    /// The value at each vertex of another field of the mesh that was sliced.
     ///
     /// # Panics
     /// If there are fewer points or numbers than in the mesh that was sliced.
-    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> Vec<f64> {
+    pub fn interpolate<'f>(&self, mesh: &MeshView<'_>, field: impl Into<FieldView<'f>>) -> Vec<f64> {
         let Some(plane) = &self.plane else { return Vec::new() };
+        let field = field.into();
         let list = self.pieces.crossings.list.iter();
         list.map(|crossing| crossing.value(field, crossing.fraction(0.0, |p| plane.height_at(mesh, p))))
             .collect()

@@ -2,7 +2,7 @@
 //!
 //! Cosines and sines are summed up here, so that the triangles are the same on every platform.
 
-use crate::view::{MeshView, Place};
+use crate::view::{FieldView, MeshView, Place};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -127,12 +127,12 @@ impl Solids {
         vertices <= MOST_VERTICES.saturating_sub(self.positions.len())
     }
 
-    /// The value at each vertex of a field of the mesh that the bodies stand in, given by one number a point: that of the line or in the
-    /// middle of the arrow.
+    /// The value at each vertex of a field of the mesh that the bodies stand in: that of the line or in the middle of the arrow.
     ///
     /// # Panics
     /// If there are fewer numbers than points in that mesh.
-    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> Vec<f64> {
+    pub fn interpolate<'f>(&self, mesh: &MeshView<'_>, field: impl Into<FieldView<'f>>) -> Vec<f64> {
+        let field = field.into();
         self.places.iter().map(|place| place.interpolate(mesh, field)).collect()
     }
 

@@ -10,7 +10,7 @@
 //! - Same mesh, same bytes; and how pieces are cut depends on the places of points, not on their numbers, which another way to the same mesh
 //!   gives otherwise.
 
-use super::MeshView;
+use super::{FieldView, MeshView};
 use super::marching::{Crossing, Crossings, Polygon};
 use crate::mesh::{FACES, NONE};
 use std::cmp::Ordering;
@@ -261,8 +261,10 @@ impl MeshWithin {
     }
 
     /// The mesh, with a field of its points: [`MeshWithin::values`], or what [`MeshWithin::interpolate`] gives.
-    pub fn view<'a>(&'a self, field: &'a [f64]) -> MeshView<'a> {
-        MeshView { positions: &self.positions, field, tets: &self.tets, neighbors: &self.neighbors }
+    pub fn view<'a>(&'a self, field: impl Into<FieldView<'a>>) -> MeshView<'a> {
+        let Self { positions, tets, neighbors, .. } = self;
+        let FieldView { values: field, is_label } = field.into();
+        MeshView { positions, field, is_label, tets, neighbors }
     }
 
     /// The field that it is cut by, at all points: at those that are new just an end of the range.
@@ -270,14 +272,15 @@ impl MeshWithin {
         &self.values
     }
 
-    /// Another field of the mesh that was cut, given by one number a point, at all points of this one.
+    /// Another field of the mesh that was cut, at all points of this one.
     ///
     /// # Panics
     /// If there are fewer numbers than points in the mesh that was cut.
-    pub fn interpolate(&self, field: &[f64]) -> Vec<f64> {
+    pub fn interpolate<'f>(&self, field: impl Into<FieldView<'f>>) -> Vec<f64> {
+        let field = field.into();
         let own = self.positions.len() - self.cuts.len();
         let new = self.cuts.iter().map(|(crossing, t)| crossing.value(field, *t));
-        field[..own].iter().copied().chain(new).collect()
+        field.values[..own].iter().copied().chain(new).collect()
     }
 
     /// Bytes of the mesh.

@@ -166,3 +166,32 @@ fn what_cannot_be_so_is_refused() {
     twice.insert(at, good[at].clone());
     assert!(decode(&assemble(&twice, mt.updates())).is_err());
 }
+
+#[test]
+fn labels_are_told_from_other_fields_and_stay_whole_numbers() {
+    let mut mesh = mesh();
+    let numbers = (0..mesh.tets.len()).map(|t| [3.0, -4.0, 5.0][t % 3]).collect();
+    mesh.cell_fields = vec![Field { is_label: true, ..Field::new("cluster", numbers) }];
+    mesh.cells_to_points();
+    for kind in [MtKind::HalfEdge, MtKind::Vertex] {
+        let bytes = written(&built(&mesh, kind));
+        let read = decode(&bytes).expect("a good file");
+        let labels: Vec<_> = read.info().fields.iter().map(|field| field.is_label).collect();
+        assert_eq!(labels.iter().filter(|is_label| **is_label).count(), 1);
+        let (file, _) = reader::open(&bytes);
+        assert!(file.info.fields.iter().map(|field| field.is_label).eq(labels.iter().copied()));
+        let cluster = read.info().fields.last().expect("fields");
+        assert_eq!((&*cluster.name, cluster.min, cluster.max), ("cluster", -4.0, 5.0));
+        assert!(cluster.is_label && read.info().averaged_fields()[1].is_label);
+        assert_eq!((cluster.step, cluster.origin, cluster.quantization), (1.0, -4.0, 0.0));
+        // Somewhere between whole numbers there can be none.
+        let sections = sections(&bytes);
+        let name = sections[0].1.windows(7).position(|bytes| bytes == b"cluster").expect("its name");
+        for (place, value) in [(7 + 16, -3.5_f64), (7 + 24, 0.5)] {
+            let mut damaged = sections.clone();
+            damaged[0].1[name + place..][..8].copy_from_slice(&value.to_le_bytes());
+            let refused = decode(&assemble(&damaged, u64::MAX)).map(|_| "read");
+            assert!(matches!(refused, Err(FormatError::Corrupt { .. })), "{value}: {refused:?}");
+        }
+    }
+}

@@ -91,6 +91,7 @@ fn compare_info(file: &File, info: &MtInfo, metadata: &[(String, String)]) {
         bits: field.bits,
         unit: field.unit.clone(),
         vector: field.vector.clone().map(|(name, component)| VectorPart { name, component }),
+        is_label: field.is_label,
         time: field.time,
         quantization: field.rounding,
         extremes: field.extremes.as_ref().map(extremes_of),

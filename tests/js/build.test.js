@@ -170,6 +170,40 @@ test("fields at cells keep their jump between regions, or get a mean across them
   assert.equal(more, 2.25);
 });
 
+test("labels are told from other fields by their names, or by what is said", async () => {
+  const points = "POINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\n";
+  const cells = "CELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\nCELL_TYPES 2\n10\n10\n";
+  const array = (name) => `SCALARS ${name} int 1\nLOOKUP_TABLE default\n8 4\n`;
+  const text = `# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n${points}${cells}CELL_DATA 2\n${array("material")}${array("load")}`;
+  const built = async (options) => {
+    const source = new TextEncoder().encode(text);
+    const { bytes, report } = await build(source, { allFields: true, cellToPoint: true, ...options });
+    const mt = await MultiTessellation.open(bytes);
+    const labels = mt.info.fields.map(({ isLabel }) => isLabel);
+    await mt.refine({ error: 0, field: options.fields[0] });
+    const inside = await mt.probe([0.2, 0.2, 0.1]);
+    mt.free();
+    assert.deepEqual(
+      report.averaged.map(({ isLabel }) => isLabel),
+      labels,
+    );
+    return [...labels, inside[0]];
+  };
+  // The second cell has three quarters of the volume around the three common corners.
+  assert.deepEqual(await built({ fields: ["material", "load"] }), [true, false, 4]);
+  assert.deepEqual(await built({ fields: ["load", "material"], labels: { load: true, material: false } }), [true, false, 4]);
+  const [isLabel, , between] = await built({ fields: ["load", "material"] });
+  assert.ok(!isLabel && between > 5 && between < 8, `${between}`);
+  for (const [labels, message] of [
+    [{ nothing: true }, /nothing/],
+    [["material"], /`labels`.*true or false/],
+    [{ material: 1 }, /`labels`.*true or false/],
+  ]) {
+    await assert.rejects(built({ fields: ["load"], labels }), { code: "bad-option", message });
+  }
+  await assert.rejects(built({ fields: ["load"], labels: { load: true }, kind: "edge" }), { code: "bad-option", message: /'load'.*kind edge/ });
+});
+
 test("what averaging does to fields at cells is in the report and in the file", async () => {
   const text =
     "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\nCELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\nCELL_TYPES 2\n10\n10\nCELL_DATA 2\nSCALARS m double 1\nLOOKUP_TABLE default\n8 4\n";

@@ -79,7 +79,8 @@ fn assert_cut(session: &mut Session, Within { field, range, .. }: Within) {
     let fields = [0, 1].map(|field| session.exact_values(field));
     let mesh = session.mesh().expect("it is open");
     let positions = &positions[..mesh.positions().len()];
-    let whole = MeshView { positions, field: &fields[field], tets: mesh.tets(), neighbors: mesh.neighbors() };
+    let (tets, neighbors) = (mesh.tets(), mesh.neighbors());
+    let whole = MeshView { positions, field: &fields[field], is_label: false, tets, neighbors };
     let expected = MeshWithin::of(&whole, &fields[field], range);
     let of_fields = fields.each_ref().map(|values| expected.interpolate(values));
     for (number, values) in of_fields.iter().enumerate() {

@@ -48,6 +48,40 @@ fn holds(mesh: &MeshView<'_>, place: &Place, p: [f64; 3]) -> bool {
 }
 
 #[test]
+fn a_label_is_that_of_the_nearest_corner() {
+    let mesh = bent(5);
+    let field: Vec<f64> = (0..mesh.positions.len()).map(|v| [2.0, 7.0, -3.0][v * v % 3]).collect();
+    let scene = Scene::new(mesh.positions, field, mesh.tets);
+    let view = MeshView { is_label: true, ..scene.view() };
+    let (mut probe, mut random) = (Probe::new(view), Random::new(5));
+    let mut seen = 0;
+    for _ in 0..4000 {
+        let p = random_point(&mut random);
+        let Some(place) = probe.locate(p) else { continue };
+        let corners = view.tets[place.tet as usize].map(|v| v as usize);
+        // The barycentric coordinate of a corner is the share of the tetrahedron opposite of it.
+        let share = |corner: usize| {
+            let mut ends = corners.map(|v| view.positions[v]);
+            ends[corner] = p;
+            let [u, v, w] = [1, 2, 3].map(|k| [0, 1, 2].map(|i| ends[k][i] - ends[0][i]));
+            let cross = |i: usize| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+            (0..3).map(|i| cross(i) * w[i]).sum::<f64>()
+        };
+        let nearest = (0..4).max_by(|&a, &b| share(a).total_cmp(&share(b))).expect("four corners");
+        let close = (0..4).filter(|&k| k != nearest && share(nearest) - share(k) < 1e-9).count();
+        if close == 0 {
+            assert_eq!(place.value(&view), view.field[corners[nearest]], "{p:?}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 1000, "{seen}");
+    // Between corners that are as near it is the smaller label.
+    let middle = Place { tet: 0, weights: [0.25; 4] };
+    let labels = view.tets[0].map(|v| view.field[v as usize]);
+    assert_eq!(middle.value(&view), labels.into_iter().fold(f64::INFINITY, f64::min));
+}
+
+#[test]
 fn points_are_found_inside_and_not_outside() {
     let mut random = Random::new(1);
     for (scene, has_pocket) in [(scene(&cube(6, &[linear])), false), (pocket(), true)] {

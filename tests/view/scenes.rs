@@ -66,6 +66,7 @@ impl Scene {
         MeshView {
             positions: &self.positions,
             field: &self.field,
+            is_label: false,
             tets: &self.tets,
             neighbors: &self.neighbors,
         }

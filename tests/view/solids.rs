@@ -223,12 +223,12 @@ fn arrows_are_closed_and_as_long_as_their_vectors() {
     }
     let mut solids = Solids::new();
     let options = ArrowOptions { spacing: 0.3, length: ArrowLength::Constant };
-    let arrows = solids.set_arrows(view, [&zero, &zero, &along_z], Some(view.field), &options);
+    let arrows = solids.set_arrows(view, [&zero, &zero, &along_z], Some(view.own_field()), &options);
     assert_eq!(arrows, 27);
     assert!((0..arrows).all(|arrow| (reach(&solids, arrow, arrows) - 0.3).abs() < 1e-6));
     assert!(solids.values.iter().any(|v| *v < 0.0), "coloured by the field");
     let before = solids.clone();
-    solids.set_arrows(view, [&zero, &zero, &along_z], Some(view.field), &options);
+    solids.set_arrows(view, [&zero, &zero, &along_z], Some(view.own_field()), &options);
     assert_eq!(solids, before, "the same again");
 }
 
@@ -242,7 +242,7 @@ fn bad_fields_have_no_arrows() {
     assert_eq!(solids.set_arrows(view, [&zero, &zero, &zero], None, &options), 0);
     assert_eq!(solids.set_arrows(view, [&zero, &nan, &one], None, &options), 0);
     assert_eq!(solids.set_arrows(view, [&zero, &one[1..], &one], None, &options), 0);
-    assert_eq!(solids.set_arrows(view, [&zero, &one, &one], Some(&[]), &options), 0);
+    assert_eq!(solids.set_arrows(view, [&zero, &one, &one], Some([].as_slice().into()), &options), 0);
     for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let options = ArrowOptions { spacing, ..options };
         assert_eq!(solids.set_arrows(view, [&zero, &one, &one], None, &options), 0);

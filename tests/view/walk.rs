@@ -99,6 +99,7 @@ impl Walk {
         MeshView {
             positions: &self.positions,
             field: &self.values,
+            is_label: false,
             tets: self.mesh.tets(),
             neighbors: self.mesh.neighbors(),
         }

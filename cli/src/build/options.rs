@@ -57,14 +57,21 @@ pub struct BuildOptions {
     /// Keep all fields but what follows from others: magnitudes of vectors, von Mises' equivalent and principal values of symmetric tensors.
     #[arg(long)]
     all_fields: bool,
-    /// Turn fields at cells into fields at points: the mean of the cells around, weighted by volume. What that does to each field is said,
-    /// and kept in the file.
+    /// Turn fields at cells into fields at points: the mean of the cells around, weighted by volume, of labels the most frequent one. What that
+    /// does to each field is said, and kept in the file.
     #[arg(long)]
     pub(super) cell_to_point: bool,
     /// With --preserve, average fields at cells over all cells around a point. If not given, files of kind half-edge keep a value for each
     /// region that meets there.
     #[arg(long, requires = "cell_to_point")]
     pub(super) mean_across_regions: bool,
+    /// A field that is a label (repeatable): whole numbers with nothing between two of them, shown by the nearest point [default: integers of at
+    /// most 256 different values whose name says that they number something, as material].
+    #[arg(long = "label", value_name = "NAME")]
+    labels: Vec<String>,
+    /// A field that is no label, whatever its name says (repeatable).
+    #[arg(long = "no-label", value_name = "NAME")]
+    no_labels: Vec<String>,
     #[command(flatten)]
     pub repair: RepairOptions,
     /// The unit of a field or vector (repeatable).
@@ -179,6 +186,16 @@ impl BuildOptions {
     /// The name of the input, for messages.
     pub fn name(&self) -> String {
         input::name(&self.inputs[0])
+    }
+
+    /// Which fields are labels, and which are not, as far as that is said.
+    pub(super) fn labels(&self) -> Vec<(String, bool)> {
+        let named = |names: &[String], is_label| names.iter().map(move |name| (name.clone(), is_label)).collect();
+        let both: [Vec<(String, bool)>; 2] = [named(&self.labels, true), named(&self.no_labels, false)];
+        if let Some((name, _)) = both[0].iter().find(|(name, _)| self.no_labels.contains(name)) {
+            refuse_usage(&format!("'{name}' is a label or not: give --label or --no-label for it"));
+        }
+        both.concat()
     }
 
     /// What the file is to say of itself.

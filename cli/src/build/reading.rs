@@ -8,7 +8,7 @@ use crate::repair::Repair;
 use crate::{files, input};
 use anyhow::{Result, anyhow};
 use tetralod::mesh::{GeometryField, RepairLevel, RepairReport, TetMesh};
-use tetralod_build::BuildConfig;
+use tetralod_build::{BuildConfig, mark_labels};
 use tetralod_build::parts::PartsError;
 use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
 
@@ -55,6 +55,7 @@ impl BuildOptions {
         input::expect_format(&self.inputs, self.format.as_deref());
         let source = input::Source { format: self.format.as_deref(), step: self.step, memory };
         let (mut mesh, repaired) = input::read_cells(&self.inputs, &wanted, level, source, alone)?;
+        mark_labels(&mut mesh, &self.labels(), config)?;
         let to_points = config.cells_to_points(self.cell_to_point, self.mean_across_regions);
         mesh.settle_cells(to_points, &config.preserve);
         mesh.add_geometry_fields(&config.fields);
@@ -79,6 +80,7 @@ impl BuildOptions {
     ) -> Result<Option<T>> {
         let needs_points = |name: &String| GeometryField::named(name).is_some();
         let needs_whole = self.cell_to_point
+            || !self.labels().is_empty()
             || matches!(self.repair.level(), RepairLevel::Weld { .. })
             || config.fields.iter().any(needs_points);
         let [path] = &self.inputs[..] else { return Ok(None) };
@@ -104,6 +106,7 @@ impl BuildOptions {
             if step.time.is_some() {
                 mesh.fields.iter_mut().for_each(|field| field.time = step.time);
             }
+            mark_labels(mesh, &[], config)?;
             self.set_units(mesh)
         };
         work(InPieces { pieces, prepare: &prepare })

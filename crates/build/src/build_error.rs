@@ -70,6 +70,27 @@ pub enum BuildError {
         /// The value that is no integer.
         value: f64,
     },
+    /// Labels are more than 2^24 apart.
+    #[error("the labels of '{name}' are too far apart: the largest may be less than 2^24 above the smallest")]
+    LabelRange {
+        /// The name of the label.
+        name: String,
+    },
+    /// A precision was given for a label.
+    #[error("'{name}' is a label, and labels are exact: give no precision for it")]
+    LabelPrecision {
+        /// The name of the label.
+        name: String,
+    },
+    /// An edge MT was to have labels.
+    #[error(
+        "'{name}' cannot be a label with kind edge: its collapses make points between others, which would have values between labels; \
+         take another kind, or no label"
+    )]
+    LabelOfEdges {
+        /// The name of the label.
+        name: String,
+    },
     /// A label is another one at another time.
     #[error(
         "'{name}' changes from one time step to another: keep apart by a label that stays, or build a single step"
@@ -216,6 +237,8 @@ impl tetralod::Coded for BuildError {
             | Self::UnknownField { .. }
             | Self::CellField { .. }
             | Self::UnknownLabel { .. }
+            | Self::LabelPrecision { .. }
+            | Self::LabelOfEdges { .. }
             | Self::TooManyFields { .. }
             | Self::Tolerance { .. }
             | Self::Option { .. } => "bad-option",

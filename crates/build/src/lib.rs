@@ -62,6 +62,8 @@ pub use collapse::edge_mt;
 pub use config::{BuildConfig, FieldPrecision};
 #[doc(hidden)]
 pub use geometry::delaunay::delaunay;
+#[doc(hidden)]
+pub use lattice::field_lattice::mark_labels;
 pub use memory::memory_needed;
 #[doc(hidden)]
 pub use memory::{memory_needed_in_parts, memory_needed_in_pieces};

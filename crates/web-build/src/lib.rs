@@ -15,7 +15,8 @@ use tetralod::Coded;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Bounds;
 use tetralod::mesh::{
-    self, COMPONENTS, Field, GeometryField, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh,
+    self, COMPONENTS, Difference, Extremes, Field, GeometryField, MeshError, MeshFindings, RepairLevel,
+    RepairReport, TetMesh,
 };
 use tetralod::mt::{AveragedField, MultiTessellation};
 use tetralod_build::{self as builder, BuildConfig, BuildError, BuildProgress, BuildSummary, Remedy};
@@ -200,7 +201,7 @@ impl MeshBuilder {
         options: BuildOptions,
         mut stages: Stages<'_>,
     ) -> Result<JsBuilt, WebError> {
-        let BuildOptions { config, cells, to_points, repair: level, units, metadata } = options;
+        let BuildOptions { config, cells, to_points, labels, repair: level, units, metadata } = options;
         let name = steps.first().map(|step| step.name.clone()).unwrap_or_default();
         let left_out = self.files.left_out();
         let mesh = self.read(steps, &config, cells, &mut stages)?;
@@ -218,6 +219,7 @@ impl MeshBuilder {
             let found = mesh::findings(&mesh, level.weld_distance()).map_err(bad_mesh)?;
             (mesh, Some((done, RepairObject::of(level, &done, &found))))
         };
+        builder::mark_labels(&mut mesh, &labels, &config).map_err(|error| refused(&error))?;
         mesh.settle_cells(to_points, &config.preserve);
         mesh.add_geometry_fields(&config.fields);
         let unknown = |(name, _): &(String, String)| {
@@ -384,7 +386,30 @@ struct ReportObject<'a> {
     repaired: &'a str,
     repair: Option<RepairObject>,
     notes: &'a [String],
-    averaged: &'a [AveragedField],
+    averaged: Vec<AveragedObject<'a>>,
+}
+
+/// What averaging has done to a field, in the words of JavaScript.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct AveragedObject<'a> {
+    name: &'a str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    unit: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<f64>,
+    is_label: bool,
+    input: &'a Extremes,
+    points: &'a Extremes,
+    difference: &'a Difference,
+}
+
+impl<'a> From<&'a AveragedField> for AveragedObject<'a> {
+    fn from(field: &'a AveragedField) -> Self {
+        let AveragedField { name, unit, time, is_label, input, points, difference } = field;
+        let (time, is_label) = (*time, *is_label);
+        Self { name, unit, time, is_label, input, points, difference }
+    }
 }
 
 #[derive(Serialize)]
@@ -460,7 +485,7 @@ fn result(
         repaired: &repaired,
         repair,
         notes: &notes,
-        averaged: &averaged,
+        averaged: averaged.iter().map(AveragedObject::from).collect(),
     });
     let built = Object::new();
     for (name, value) in [("bytes", Uint8Array::from(bytes).into()), ("report", report)] {

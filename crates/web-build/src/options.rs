@@ -13,7 +13,7 @@ use tetralod_web_options::read_error::ReadError;
 use wasm_bindgen::JsValue;
 
 /// The names of all options.
-const NAMES: [&str; 25] = [
+const NAMES: [&str; 26] = [
     "kind",
     "method",
     "criterion",
@@ -23,6 +23,7 @@ const NAMES: [&str; 25] = [
     "allFields",
     "cellToPoint",
     "meanAcrossRegions",
+    "labels",
     "repair",
     "weldDistance",
     "units",
@@ -48,6 +49,8 @@ pub struct BuildOptions {
     pub cells: bool,
     /// What they become.
     pub to_points: CellsToPoints,
+    /// Which fields are labels, and which are not, as far as that is said.
+    pub labels: Vec<(String, bool)>,
     /// What is mended in the mesh.
     pub repair: RepairLevel,
     /// Units of fields or vectors.
@@ -117,7 +120,9 @@ fn read(given: &Given, construction: Construction, default: BuildConfig) -> Resu
     }
     let (cells, repair) = (given.answer("cellToPoint")?, repair(given)?);
     let to_points = config.cells_to_points(cells, given.answer("meanAcrossRegions")?);
-    Ok(BuildOptions { config, cells, to_points, repair, units: pairs(given, "units")?, metadata })
+    let labels = labels(given)?;
+    let units = pairs(given, "units")?;
+    Ok(BuildOptions { config, cells, to_points, labels, repair, units, metadata })
 }
 
 fn is_reserved(key: &str) -> bool {
@@ -132,6 +137,16 @@ fn pairs(given: &Given, name: &str) -> Result<Vec<(String, String)>, ReadError> 
     let refused = || given.refuse(name, "must be an object whose members are texts");
     let pairs = given.members(name).ok_or_else(refused)?.into_iter();
     pairs.map(|(name, text)| Some((name, text.as_string()?))).collect::<Option<_>>().ok_or_else(refused)
+}
+
+/// Which fields are labels, and which are not.
+fn labels(given: &Given) -> Result<Vec<(String, bool)>, ReadError> {
+    if !given.has("labels") {
+        return Ok(Vec::new());
+    }
+    let refused = || given.refuse("labels", "must be an object whose members are true or false");
+    let labels = given.members("labels").ok_or_else(refused)?.into_iter();
+    labels.map(|(name, is)| Some((name, is.as_bool()?))).collect::<Option<_>>().ok_or_else(refused)
 }
 
 /// For all fields, and for one each by its name.

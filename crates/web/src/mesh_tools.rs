@@ -28,7 +28,9 @@ macro_rules! mesh_tools {
                     let js = tools::iso_surface(surface, &stored);
                     tools::put_fields(
                         js.as_ref(),
-                        fields.iter().map(|field| surface.interpolate(&mesh, &session.values(*field))),
+                        fields.iter().map(|field| {
+                            surface.interpolate(&mesh, tools::view(session, *field, &session.values(*field)))
+                        }),
                     );
                     Ok(js)
                 }
@@ -47,7 +49,9 @@ macro_rules! mesh_tools {
                     let js = tools::section(slice, &stored);
                     tools::put_fields(
                         js.as_ref(),
-                        fields.iter().map(|field| slice.interpolate(&mesh, &session.values(*field))),
+                        fields.iter().map(|field| {
+                            slice.interpolate(&mesh, tools::view(session, *field, &session.values(*field)))
+                        }),
                     );
                     Ok(js)
                 }

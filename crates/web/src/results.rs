@@ -97,7 +97,7 @@ fn regions(regions: &Regions, info: &MtInfo) -> JsValue {
 }
 
 fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
-    let FieldInfo { name, min, max, bits, unit, time, vector, extremes: ends, averaged, .. } =
+    let FieldInfo { name, min, max, bits, unit, time, vector, is_label, extremes: ends, averaged, .. } =
         &info.fields[index];
     let vector = vector.as_ref().map(|part| {
         object(&[("name", part.name.as_str().into()), ("component", part.component.map(f64::from).into())])
@@ -117,6 +117,7 @@ fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
         ("unit", unit.as_str().into()),
         ("time", (*time).into()),
         ("vector", vector.unwrap_or(JsValue::UNDEFINED)),
+        ("isLabel", (*is_label).into()),
         ("floor", (info.floor(index) * info.fields[index].range()).into()),
         ("histogram", histogram),
         ("extremes", ends.as_ref().map_or(JsValue::UNDEFINED, extremes)),

@@ -5,7 +5,7 @@ use crate::stored::Stored;
 use js_sys::{Array, Object};
 use tetralod::session::{RegionStats, Session};
 use tetralod::view::{
-    BoundarySurface, FieldStats, Histogram, IsoSurface, MeshView, Plane, Probe, Slice, Streamline,
+    BoundarySurface, FieldStats, FieldView, Histogram, IsoSurface, MeshView, Plane, Probe, Slice, Streamline,
     TraceOptions, Tracer,
 };
 use tetralod_web_options::error::WebError;
@@ -73,6 +73,12 @@ pub fn boundary(mesh: &MeshView<'_>, fields: impl Iterator<Item = Vec<f64>>, sto
     let js = triangles(&boundary.positions, &boundary.values, &boundary.indices, stored);
     put_fields(&js, fields.map(|field| boundary.interpolate(&field)));
     js.unchecked_into()
+}
+
+/// A field of a session, whose values are these.
+pub fn view<'a>(session: &Session, field: usize, values: &'a [f64]) -> FieldView<'a> {
+    let is_label = session.info().is_some_and(|info| info.fields.get(field).is_some_and(|field| field.is_label));
+    FieldView { values, is_label }
 }
 
 /// Puts the values of other fields at the vertices of a surface beside it, in double precision: the package stores them as each needs it.

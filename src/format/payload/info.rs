@@ -87,15 +87,17 @@ pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatErr
     Ok((info, metadata))
 }
 
-/// Set in the flags of a field that is a part of a vector, and that is its length; and of a field of a known time.
+/// Set in the flags of a field that is a part of a vector, and that is its length; of a field of a known time; of a label.
 const OF_VECTOR: u8 = 1;
 const IS_LENGTH: u8 = 2;
 const HAS_TIME: u8 = 4;
+const IS_LABEL: u8 = 8;
 
-/// Whether lattices round something off, or a field has a unit, a vector or a time: else nothing of that is written.
+/// Whether lattices round something off, or a field has a unit, a vector or a time, or is a label: else nothing of that is written.
 fn has_details(info: &MtInfo) -> bool {
     let of_field = |field: &FieldInfo| {
-        !field.unit.is_empty() || field.vector.is_some() || field.time.is_some() || field.quantization != 0.0
+        let has_name = !field.unit.is_empty() || field.vector.is_some();
+        has_name || field.time.is_some() || field.is_label || field.quantization != 0.0
     };
     info.quantization != 0.0 || info.fields.iter().any(of_field)
 }
@@ -111,7 +113,8 @@ fn write_details(out: &mut Vec<u8>, info: &MtInfo) {
             Some(None) => OF_VECTOR | IS_LENGTH,
             Some(Some(_)) => OF_VECTOR,
         };
-        out.push(of_vector | if field.time.is_some() { HAS_TIME } else { 0 });
+        let flag = |is_set: bool, flag: u8| if is_set { flag } else { 0 };
+        out.push(of_vector | flag(field.time.is_some(), HAS_TIME) | flag(field.is_label, IS_LABEL));
         if let Some(VectorPart { name, component }) = &field.vector {
             write::string(out, name);
             out.extend(component);
@@ -126,8 +129,13 @@ fn read_details(reader: &mut Reader<'_>, info: &mut MtInfo) -> Result<(), Format
         field.quantization = reader.f64()?;
         field.unit = reader.string()?.to_owned();
         let flags = reader.u8()?;
-        if flags & !(OF_VECTOR | IS_LENGTH | HAS_TIME) != 0 || flags & (OF_VECTOR | IS_LENGTH) == IS_LENGTH {
+        let known = OF_VECTOR | IS_LENGTH | HAS_TIME | IS_LABEL;
+        if flags & !known != 0 || flags & (OF_VECTOR | IS_LENGTH) == IS_LENGTH {
             return Err(reader.corrupt("the flags of a field are not known"));
+        }
+        field.is_label = flags & IS_LABEL != 0;
+        if field.is_label && (field.step != 1.0 || field.origin.fract() != 0.0) {
+            return Err(reader.corrupt("the values of a label are not whole numbers"));
         }
         if flags & OF_VECTOR != 0 {
             let name = reader.string()?.to_owned();

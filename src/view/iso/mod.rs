@@ -25,7 +25,7 @@ mod update;
 use super::marching::{Crossing, Pieces, Polygon, select};
 use super::mesh_snapshot::MeshSnapshot;
 use super::moves::{Slope, slope};
-use super::{MeshView, SurfaceChanges};
+use super::{FieldView, MeshView, SurfaceChanges};
 use crate::mesh::{BLOCK, NONE};
 use block_ranges::BlockRanges;
 use glam::DVec3;
@@ -134,11 +134,12 @@ impl IsoSurface {
         self.rebuild(mesh, distinct(values));
     }
 
-    /// The value at each vertex of another field of the mesh that the surface was made of, given by one number a point.
+    /// The value at each vertex of another field of the mesh that the surface was made of.
     ///
     /// # Panics
     /// If there are fewer points or numbers than in that mesh.
-    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> Vec<f64> {
+    pub fn interpolate<'f>(&self, mesh: &MeshView<'_>, field: impl Into<FieldView<'f>>) -> Vec<f64> {
+        let field = field.into();
         let value = |crossing: &Crossing| {
             crossing.value(field, fraction(crossing, mesh, self.isovalues[crossing.which as usize]))
         };

@@ -2,6 +2,7 @@
 
 use super::polygon::Ends;
 use crate::mesh::NONE;
+use crate::view::FieldView;
 
 /// Where the surface crosses an edge: its ends, or twice the same point if the surface goes through that point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,10 +56,15 @@ impl Crossing {
         [0, 1, 2].map(|i| between(p[i], q[i], t))
     }
 
-    /// The value there of a field with one number a point.
-    pub fn value(&self, field: &[f64], t: f64) -> f64 {
-        let [a, b] = self.ends.map(|end| field[end as usize]);
-        between(a, b, t)
+    /// The value there of a field; of a label that of the nearer end, the smaller one in the middle.
+    pub fn value(&self, field: FieldView<'_>, t: f64) -> f64 {
+        let [a, b] = self.ends.map(|end| field.values[end as usize]);
+        match field.is_label {
+            true if t < 0.5 => a,
+            true if t > 0.5 => b,
+            true => a.min(b),
+            false => between(a, b, t),
+        }
     }
 }
 

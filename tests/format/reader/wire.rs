@@ -125,6 +125,7 @@ pub struct Field {
     pub unit: String,
     /// Name and component; none is the length.
     pub vector: Option<(String, Option<u8>)>,
+    pub is_label: bool,
     pub time: Option<f64>,
     /// The smallest and the largest value.
     pub extremes: Option<[Extreme; 2]>,
@@ -181,6 +182,7 @@ pub fn info(mut bytes: Bytes<'_>) -> Info {
             rounding: 0.0,
             unit: String::new(),
             vector: None,
+            is_label: false,
             time: None,
             extremes: None,
             averaged: None,
@@ -207,7 +209,9 @@ fn more(bytes: &mut Bytes<'_>, info: &mut Info) {
         field.rounding = bytes.f64();
         field.unit = bytes.string();
         let flags = bytes.u8();
-        assert!(flags <= 7 && flags & 3 != 2);
+        assert!(flags <= 15 && flags & 3 != 2);
+        field.is_label = flags & 8 != 0;
+        assert!(!field.is_label || field.step == 1.0 && field.origin.fract() == 0.0);
         if flags & 1 != 0 {
             let name = bytes.string();
             let component = if flags & 2 == 0 { Some(bytes.u8()) } else { None };

@@ -47,6 +47,7 @@ const examples: Examples<BuildOptions> = {
   allFields: { allFields: true },
   cellToPoint: { cellToPoint: false },
   meanAcrossRegions: { meanAcrossRegions: true },
+  labels: { labels: { p: true } },
   preserve: { preserve: ["components"] },
   preserveWithin: { preserveWithin: 0.01 },
   repair: { repair: "none" },

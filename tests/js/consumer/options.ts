@@ -168,6 +168,7 @@ const fields: Members<FieldInfo> = {
   averaged: "object undefined",
   isovalue: "number",
   curve: "object",
+  isLabel: "boolean",
 };
 
 const values: Members<FieldValues> = {

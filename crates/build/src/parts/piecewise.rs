@@ -18,10 +18,10 @@ use crate::restrict::restrictions::Restrictions;
 use crate::{BuildConfig, BuildError, Purpose};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use tetralod::geom::{Bounds, Lattice, WIDE_BITS};
-use tetralod::mesh::{Extremes, FACES, Field, MAX_TETS, MeshInput, MeshPiece, TetMesh};
+use tetralod::geom::{Bounds, Lattice, WIDE_BITS, bits_of};
+use tetralod::mesh::{Extremes, FACES, Field, MAX_TETS, MOST_LABELS, MeshInput, MeshPiece, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
 /// Where [`Piecewise`] puts what it does not keep in memory, by names of letters, digits and dashes.
@@ -75,6 +75,8 @@ struct Sums {
     /// Of positions, tetrahedra, and each field.
     hashers: [crc32fast::Hasher; 2],
     of_fields: Vec<crc32fast::Hasher>,
+    /// The values of each field that is a label.
+    labels: Vec<BTreeSet<u64>>,
 }
 
 /// Why pieces have to be put together first.
@@ -113,6 +115,7 @@ impl<'a> Piecewise<'a> {
             used: Vec::new(),
             hashers: Default::default(),
             of_fields: Vec::new(),
+            labels: Vec::new(),
         };
         Ok(Self { config, purpose, parts, scratch, pieces: 0, sums })
     }
@@ -147,6 +150,7 @@ impl<'a> Piecewise<'a> {
             sums.input.other_cell_fields.clone_from(&mesh.input.other_cell_fields);
             sums.extremes = vec![None; mesh.fields.len()];
             sums.of_fields = mesh.fields.iter().map(|_| crc32fast::Hasher::new()).collect();
+            sums.labels = vec![BTreeSet::new(); mesh.fields.len()];
         }
         let is_new = |i: &usize| points[*i] >= first;
         let new: Vec<usize> = (0..points.len()).filter(is_new).collect();
@@ -171,6 +175,13 @@ impl<'a> Piecewise<'a> {
             sum.integer &= field.integer && values().all(|x| field_lattice::is_exact_integer(&x));
             if low <= high {
                 sum.values = vec![low, high];
+            }
+            sum.is_label &= field.is_label;
+        }
+        for (labels, field) in sums.labels.iter_mut().zip(&mesh.fields).filter(|(_, field)| field.is_label) {
+            labels.extend(new.iter().map(|&i| bits_of(field.values[i])));
+            if labels.len() > MOST_LABELS {
+                return whole("a label has many values");
             }
         }
         let end = u64::from(first) + new.len() as u64;

@@ -12,6 +12,7 @@ use tetralod::session::Session;
 use tetralod_build::verify::{Reference, Sample};
 use tetralod_build::{
     BuildConfig, BuildCriterion, BuildError, BuildResult, Construction, FieldPrecision, Method, Remedy, build,
+    mark_labels,
 };
 
 /// Every kind with every way to build it.
@@ -177,6 +178,59 @@ fn integers_are_exact_by_themselves() {
     let precision_of = vec![("narrow".to_owned(), FieldPrecision::Bits(3))];
     let mt = made(&mesh, &BuildConfig { precision_of, ..config }).mt;
     assert_eq!(mt.info().fields[0].bits, 3);
+}
+
+#[test]
+fn labels_are_exact_or_refused() {
+    let mut mesh = cube(3, &[]);
+    let points = mesh.positions.len();
+    let of = |name: &str, integer: bool, value: fn(usize) -> f64| Field {
+        integer,
+        ..Field::new(name, (0..points).map(value).collect())
+    };
+    let third = |i: usize| (i % 3) as f64;
+    mesh.fields = vec![
+        of("density", true, third),
+        of("material", true, third),
+        of("group", false, third),
+        of("wide_id", true, |i| if i == 0 { 2e7 } else { 0.0 }),
+        of("tag", false, |i| 0.5 * i as f64),
+    ];
+    let config = BuildConfig { all_fields: true, ..BuildConfig::default() };
+    let marked = |given: &[(&str, bool)], config: &BuildConfig| {
+        let given: Vec<_> = given.iter().map(|&(name, is)| (name.to_owned(), is)).collect();
+        let mut mesh = mesh.clone();
+        mark_labels(&mut mesh, &given, config)?;
+        let mt = try_build(&mesh, config)?.mt;
+        let labels = mt.info().fields.iter().filter(|field| field.is_label);
+        Ok(labels.map(|field| field.name.clone()).collect::<Vec<_>>().join(" "))
+    };
+    assert_eq!(marked(&[], &config), Ok("material".to_owned()));
+    assert_eq!(marked(&[("material", false)], &config), Ok(String::new()));
+    // By value, whatever the type and the name.
+    assert_eq!(
+        marked(&[("group", true), ("density", true)], &config),
+        Ok("density material group".to_owned())
+    );
+    let precise = |name: &str| {
+        let precision_of = vec![(name.to_owned(), FieldPrecision::Bits(8))];
+        BuildConfig { precision_of, ..config.clone() }
+    };
+    assert_eq!(marked(&[], &precise("material")), Ok(String::new()));
+    let edge = BuildConfig { all_fields: true, ..BuildConfig::of(MtKind::Edge) };
+    assert_eq!(marked(&[], &edge), Ok(String::new()));
+    let group = || "group".to_owned();
+    assert_eq!(marked(&[("group", true)], &edge), Err(BuildError::LabelOfEdges { name: group() }));
+    assert_eq!(
+        marked(&[("group", true)], &precise("group")),
+        Err(BuildError::LabelPrecision { name: group() })
+    );
+    let name = "wide_id".to_owned();
+    assert_eq!(marked(&[("wide_id", true)], &config), Err(BuildError::LabelRange { name }));
+    let name = "tag".to_owned();
+    assert_eq!(marked(&[("tag", true)], &config), Err(BuildError::Label { name, at: 1, value: 0.5 }));
+    let unknown = marked(&[("nothing", true)], &config);
+    assert!(matches!(unknown, Err(BuildError::UnknownField { name, .. }) if name == "nothing"));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::io as std_io;
 use std::path::{Path, PathBuf};
 use tetralod::mesh::{Field, MeshPiece, RepairLevel, TetMesh, repair_at};
 use tetralod_build::parts::{Part, PartsError, Piecewise, Plan, Scratch};
-use tetralod_build::{BuildConfig, FieldPrecision};
+use tetralod_build::{BuildConfig, FieldPrecision, mark_labels};
 use tetralod_io as io;
 use tetralod_io::{CellData, Pieces, ReadOptions};
 
@@ -73,8 +73,8 @@ fn write(
         points.dedup();
         let number = |v: u32| points.iter().position(|&other| other == v).expect("it is there") as u32;
         // What a piece says of points of earlier ones does not count.
-        let values =
-            |field: &Field| points.iter().map(|&v| field.values[v as usize] + 1e-7 * piece as f64).collect();
+        let off = |field: &Field| if field.name == CLUSTER { piece as f64 } else { 1e-7 * piece as f64 };
+        let values = |field: &Field| points.iter().map(|&v| field.values[v as usize] + off(field)).collect();
         let part = TetMesh {
             positions: points.iter().map(|&v| mesh.positions[v as usize]).collect(),
             fields: mesh
@@ -156,6 +156,9 @@ fn part_pieces(
     Ok((plan, all))
 }
 
+/// A field that is a label by its name.
+const CLUSTER: &str = "cluster_id";
+
 /// A shell whose cells are about as thick as the steps of the coarsest lattice, so that points leave their cells.
 fn thin(n: u32) -> TetMesh {
     let mut mesh = blocks([n; 3], &[hilly], |_| true);
@@ -176,7 +179,15 @@ fn meshes() -> Vec<(&'static str, TetMesh)> {
     let mut whole_numbers = blocks([6; 3], &[|p| (40.0 * p[0]).round()], |_| true);
     whole_numbers.grid = None;
     whole_numbers.fields[0].integer = true;
-    vec![("shaken", shaken), ("bent", bent(7)), ("thin", thin(6)), ("whole numbers", whole_numbers)]
+    let mut labels = whole_numbers.clone();
+    labels.fields[0].name = CLUSTER.to_owned();
+    vec![
+        ("shaken", shaken),
+        ("bent", bent(7)),
+        ("thin", thin(6)),
+        ("whole numbers", whole_numbers),
+        ("labels", labels),
+    ]
 }
 
 #[test]
@@ -190,11 +201,16 @@ fn pieces_have_the_parts_of_their_whole() {
                 "mixed" => write(&folder, &mesh, count, mixed),
                 _ => write(&folder, &mesh, count, slabs),
             };
-            let whole = io::read(&path).expect("a mesh");
+            let mut whole = io::read(&path).expect("a mesh");
+            mark_labels(&mut whole, &[], &BuildConfig::default()).expect("no names");
             let (repaired, report) = repair_at(whole.clone(), RepairLevel::Safe).expect("a sound mesh");
             assert!(report.is_empty() && repaired == whole, "{name}, {how}: {report}");
-            let pieces = pieces(&path);
+            let mut pieces = pieces(&path);
             assert_eq!(pieces.len(), count);
+            for piece in &mut pieces {
+                mark_labels(&mut piece.mesh, &[], &BuildConfig::default()).expect("no names");
+            }
+            assert_eq!(whole.fields[0].is_label, name == "labels");
             let together = joined(&pieces);
             assert_eq!(
                 (&together.positions, &together.tets),
@@ -248,6 +264,11 @@ fn what_only_a_whole_tells_is_left_to_it() {
     needs_whole(&good, &tolerant, "a tolerance is given");
     let kept = BuildConfig { keep_points: vec![[0.0; 3]], ..BuildConfig::default() };
     needs_whole(&good, &kept, "regions and single points are kept");
+    let mut many = good.clone();
+    for piece in &mut many {
+        piece.mesh.fields[0].is_label = true;
+    }
+    needs_whole(&many, &config, "a label has many values");
     assert!(matches!(part_pieces(&good, &config, 3), Err(PartsError::Count { parts: 3 })));
     assert!(matches!(part_pieces(&good, &config, 4096), Err(PartsError::TooMany { parts: 4096, .. })));
     // What a folder loses is an error, not a panic.

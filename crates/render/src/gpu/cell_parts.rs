@@ -65,7 +65,7 @@ mod tests {
         [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
 
     fn mesh() -> MeshView<'static> {
-        MeshView { positions: &PLACES, field: &[0.0; 5], tets: &TETS, neighbors: &AROUND }
+        MeshView { positions: &PLACES, field: &[0.0; 5], is_label: false, tets: &TETS, neighbors: &AROUND }
     }
 
     #[test]

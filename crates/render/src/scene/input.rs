@@ -11,7 +11,7 @@ use tetralod::geom::{Bounds, SingleValues};
 use tetralod::mesh::NONE;
 use tetralod::mt::{MeshChanges, MtInfo, Regions, numbers_of};
 use tetralod::session::{Session, TetQuantity};
-use tetralod::view::{ColourScale, Difference, MeshView};
+use tetralod::view::{ColourScale, Difference, FieldView, MeshView};
 
 /// What was computed last of a session's mesh before any object.
 #[derive(Debug, Default)]
@@ -84,7 +84,7 @@ impl Current {
             None => [mesh.tets, mesh.neighbors],
         };
         Input {
-            mesh: MeshView { field: coloured, tets, neighbors, ..mesh },
+            mesh: MeshView { field: coloured, is_label: mesh.is_label && difference.is_none(), tets, neighbors, ..mesh },
             field: mesh.field,
             largest_difference: difference.map(|difference| difference.largest),
             apart: self.compared.as_ref().map_or(0, |(apart, _)| *apart),
@@ -208,6 +208,12 @@ impl<'a> Input<'a> {
             steps.fold(0.0_f64, |most, step| most.max(step.min.abs()).max(step.max.abs()))
         };
         [0.0, names.iter().map(largest).fold(0.0, f64::hypot)]
+    }
+
+    /// Values of a field, or of a difference, with what is between them.
+    pub fn of<'f>(&self, field: usize, values: &'f [f64]) -> FieldView<'f> {
+        let is_difference = field == self.shown && self.largest_difference.is_some();
+        FieldView { values, is_label: self.info.fields[field].is_label && !is_difference }
     }
 
     /// What colours by a field: its values, or the difference.

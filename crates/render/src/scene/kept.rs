@@ -25,6 +25,8 @@ pub(super) struct KeptMesh {
     tets: Vec<[u32; 4]>,
     neighbors: Vec<[u32; 4]>,
     fields: Vec<Vec<f64>>,
+    /// Of each field, whether it is a label.
+    labels: Vec<bool>,
     /// The region of each tetrahedron, and the colour of each region.
     regions: Vec<u16>,
     colors: Vec<u8>,
@@ -74,6 +76,7 @@ impl KeptMesh {
             tets,
             neighbors,
             fields,
+            labels: labels(Some(info)),
             regions: Vec::new(),
             colors: Vec::new(),
             quantities: Vec::new(),
@@ -101,21 +104,39 @@ impl KeptMesh {
         let fields = (0..count).map(|field| session.values(field)).collect();
         let regions = session.shown_regions().into_owned();
         let colors = session.regions().map_or_else(Vec::new, Regions::colors);
+        let labels = labels(session.info());
         let MeshView { positions, tets, neighbors, .. } = session.view();
         let (positions, tets, neighbors) = (positions.to_vec(), tets.to_vec(), neighbors.to_vec());
         let changes = MeshChanges::of_all_vertices(positions.len());
-        Ok(Self { positions, tets, neighbors, fields, regions, colors, quantities, changes, reach: None })
+        Ok(Self {
+            positions,
+            tets,
+            neighbors,
+            fields,
+            labels,
+            regions,
+            colors,
+            quantities,
+            changes,
+            reach: None,
+        })
     }
 
     /// The mesh with one of its fields.
     pub fn view(&self, field: usize) -> MeshView<'_> {
-        let Self { positions, tets, neighbors, .. } = self;
-        MeshView { positions, field: self.values(field), tets, neighbors }
+        let Self { positions, tets, neighbors, labels, .. } = self;
+        let is_label = labels.get(field).copied().unwrap_or(false);
+        MeshView { positions, field: self.values(field), is_label, tets, neighbors }
     }
 
     fn values(&self, field: usize) -> &[f64] {
         self.fields.get(field).map_or(&[], Vec::as_slice)
     }
+}
+
+/// Of each field, whether it is a label.
+fn labels(info: Option<&MtInfo>) -> Vec<bool> {
+    info.map_or_else(Vec::new, |info| info.fields.iter().map(|field| field.is_label).collect())
 }
 
 impl Kept {

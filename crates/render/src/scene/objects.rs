@@ -220,7 +220,8 @@ impl Isosurface {
         self.changes = self.surface.take_changes();
         let is_coloured = state.field.is_some() || input.largest_difference.is_some();
         let coloured = is_coloured.then(|| input.field("isosurfaces", state.field.as_ref())).transpose()?;
-        let values = coloured.map(|field| self.surface.interpolate(&mesh, &input.values(field)));
+        let values = coloured
+            .map(|field| self.surface.interpolate(&mesh, input.of(field, &input.values(field))));
         self.values = values.unwrap_or_default();
         let scale = coloured.map(|field| input.scale(field)).transpose()?;
         (self.moves, self.slopes) = by.as_ref().map_or_else(Default::default, |by| {
@@ -272,7 +273,7 @@ impl Section {
         let plane = state.plane();
         self.slice.extract(mesh, &plane.plane());
         let is_other = field != input.shown;
-        let values = is_other.then(|| self.slice.interpolate(mesh, &(input.fields)(field)));
+        let values = is_other.then(|| self.slice.interpolate(mesh, input.of(field, &(input.fields)(field))));
         self.values = values.unwrap_or_default();
         let moves = by.as_ref().map(|by| by.at(|component| self.slice.interpolate(mesh, component)));
         self.moves = moves.unwrap_or_default();
@@ -448,8 +449,8 @@ fn streamlines<'a>(
         None => own.surface.set_tubes(&lines, &options),
         Some(field) => {
             let numbers = (input.fields)(field);
-            let mesh = MeshView { field: &numbers, ..input.mesh };
-            own.surface.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
+            let values = input.of(field, &numbers);
+            own.surface.set_tubes_with(&lines, &options, |point| point.place.interpolate(&input.mesh, values));
         }
     }
     own.follow(by, |tubes, component| tubes.interpolate(&input.mesh, component));
@@ -473,7 +474,8 @@ fn arrow_list<'a>(
         length: if *constant { ArrowLength::Constant } else { ArrowLength::Magnitude },
     };
     let components = [&*vectors[0], &vectors[1], &vectors[2]];
-    own.surface.set_arrows(input.mesh, components, numbers.as_deref(), &options);
+    let coloured_by = values.zip(numbers.as_deref()).map(|(field, values)| input.of(field, values));
+    own.surface.set_arrows(input.mesh, components, coloured_by, &options);
     own.follow(by, |arrows, component| arrows.interpolate(&input.mesh, component));
     solids(own, input, ARROWS, values, ("magnitude", input.lengths(fields)), legend)
 }
