@@ -235,10 +235,15 @@ export interface Legend {
   label: string;
   range: [number, number];
   log: boolean;
-  /** Evenly spaced CSS colours from the lower to the upper end of the range. */
+  /** Evenly spaced CSS colours from the lower to the upper end of the range; of a label (`isLabel`) equal parts for all that the mesh has. */
   colours: string[];
-  /** The ends of the range, and round numbers between them, ascending; `fraction` is where the tick is in the range, 0 to 1. */
+  /**
+   * The ends of the range, and round numbers between them, ascending; `fraction` is where the tick is in the range, 0 to 1. Of a label some that
+   * the mesh has, in the middle of their colours.
+   */
   ticks: { value: number; label: string; fraction: number }[];
+  /** Of a label (`isLabel`) all that the mesh has, ascending, with their CSS colours; empty for other fields. */
+  labels: { value: number; colour: string }[];
   /** Of the difference to a mesh of another file: so many points of the mesh are outside of that one. They have no value, and their tetrahedra are not shown. */
   apart: number;
 }

@@ -78,7 +78,7 @@ function mark() {
   const { legend } = viewer();
   const [low, high] = legend?.range ?? [0, 0];
   const even = (/** @type {number} */ value) => (legend?.log ? Math.log(value) : value);
-  const isOfField = legend?.label === store.state.field && high > low;
+  const isOfField = legend?.label === store.state.field && legend.labels.length === 0 && high > low;
   const shown = (isOfField ? extremes() : []).map(([what, { value }]) => {
     const part = (even(value) - even(low)) / (even(high) - even(low));
     const sign = element("span", { title: `${what} ${grouped(value)}` }, "▾");

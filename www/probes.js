@@ -56,7 +56,7 @@ const SHADES = Array.from({ length: 32 }, (_, i) => `hsl(210 25% ${12 + 2.5 * i}
 function scale() {
   const { name, min, max } = shownField();
   const { legend } = viewer();
-  return legend?.label === name ? legend : { range: /** @type {[number, number]} */ ([min, max]), log: false, colours: SHADES };
+  return legend?.label === name && legend.labels.length === 0 ? legend : { range: /** @type {[number, number]} */ ([min, max]), log: false, colours: SHADES };
 }
 
 /** The field that is plotted. */

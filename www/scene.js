@@ -79,6 +79,9 @@ function opacities() {
   return pointsOf(store.state.transfer, isovaluePart()).map(([at, opacity]) => [min + at * (max - min), opacity * opacityOf("volume")]);
 }
 
+/** Whether labels are shown where there is nothing between two of them: as the boundary. @param {string} name */
+const isBoundaryOfLabels = (name) => ["iso", "volume"].includes(name) && shownField().isLabel;
+
 /** What each part of the picture adds to the scene. @type {Record<string, () => SceneState>} */
 const PARTS = {
   iso() {
@@ -126,9 +129,9 @@ export function draw() {
   if (!shows("volume")) hideRefusal();
   const isPlain = (mode() === "iso" && !by) || (mode() === "solid" && isByRegion());
   $("colours").hidden = isPlain && !beside().some((name) => name !== "solid");
-  $("range").hidden = !isByField();
+  $("range").hidden = !isByField() || shownField().isLabel;
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [], streamlines: null, arrows: null };
-  const parts = [...beside(), mode()].map((name) => PARTS[name]());
+  const parts = [...beside(), mode()].map((name) => (isBoundaryOfLabels(name) ? { boundary: { opacity: opacityOf(name) } } : PARTS[name]()));
   const compare = comparison();
   // A difference has values on both sides of 0.
   const diverging = compare?.difference ? { map: "coolwarm" } : {};
@@ -163,12 +166,14 @@ export function showLegend(legend) {
   if (demo.info && label === store.state.field) $("transfer-bar").style.background = gradient(legend);
   $("legend-bar").dataset.colours = legend.colours.join(" ");
   $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
+  $("legend-bar").title = legend.labels.map(({ value }) => value).join(", ");
   // The ends of the range are shown in any case, what is between them where there is room.
   const isEnd = (/** @type {{ fraction: number }} */ { fraction }) => fraction === 0 || fraction === 1;
   const shown = [...ticks.filter(isEnd), ...ticks.filter((tick) => !isEnd(tick))].map(tickElement);
   $("legend-ticks").replaceChildren(...shown);
   leaveOutOverlaps(shown);
-  const note = [...differenceNote(legend), ...averagedNote(demo.info?.fields.filter(({ name }) => name === label) ?? [])];
+  const instead = demo.info && [...beside(), mode()].some(isBoundaryOfLabels) ? ["labels have no values between: the boundary is shown"] : [];
+  const note = [...instead, ...differenceNote(legend), ...averagedNote(demo.info?.fields.filter(({ name }) => name === label) ?? [])];
   $("legend-note").replaceChildren(...note.map((textContent) => element("span", { textContent })));
   $("legend-note").hidden = note.length === 0;
   refreshExtremes();

@@ -11,7 +11,8 @@ const ENDS = /** @type {const} */ (["threshold-low", "threshold-high"]);
 /** What the scene says of it. @returns {import("tetralod/viewer").ThresholdState | null} */
 export function threshold() {
   const { threshold: range, field, "threshold-cut": cut } = store.state;
-  return range ? { field, range, ...(cut ? { cut } : {}) } : null;
+  // Nothing can be cut between two labels.
+  return range ? { field, range, ...(cut && !shownField().isLabel ? { cut } : {}) } : null;
 }
 
 /** Cuts cells at the ends of the range, or shows whole ones; turns the threshold on if it is off. */

@@ -296,9 +296,10 @@ const linear = (/** @type {number} */ channel) => (channel <= 0.04045 ? channel 
  * The colours that values have on the scale of a legend, as linear light: what glTF has in `COLOR_0`.
  *
  * @param {Numbers} values in units of the field
- * @param {Pick<import("tetralod/viewer").Legend, "range" | "log" | "colours">} legend
+ * @param {Pick<import("tetralod/viewer").Legend, "range" | "log" | "colours"> & Partial<Pick<import("tetralod/viewer").Legend, "labels">>} legend
  */
-export function coloursOf(values, { range, log, colours }) {
+export function coloursOf(values, { range, log, colours, labels = [] }) {
+  if (labels.length > 0) return coloursOfLabels(values, labels);
   const even = (/** @type {number} */ value) => (log ? Math.log(value) : value);
   const [low, high] = range.map(even);
   const table = colours.map((colour) => [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16) / 255));
@@ -312,6 +313,13 @@ export function coloursOf(values, { range, log, colours }) {
     found.set(mixed, 3 * i);
   });
   return found;
+}
+
+/** The colours of labels, as linear light. @param {Numbers} values @param {import("tetralod/viewer").Legend["labels"]} labels */
+function coloursOfLabels(values, labels) {
+  const light = (/** @type {string} */ colour) => [1, 3, 5].map((at) => linear(Number.parseInt(colour.slice(at, at + 2), 16) / 255));
+  const known = new Map(labels.map(({ value, colour }) => [value, light(colour)]));
+  return Float32Array.from([...values].flatMap((value) => known.get(Math.round(value)) ?? [0.5, 0.5, 0.5]));
 }
 
 /** Comma-separated values. Numbers that are missing are empty. @param {(string | number | undefined)[][]} rows @returns {[string]} */

@@ -110,10 +110,23 @@ struct Colours {
     reversed: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     bands: Option<u8>,
+    /// Of a label, those that the mesh has, ascending, and their colours as CSS has them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    labels: Vec<Label>,
     /// What averaging has done to the field that is shown, if the input has it at cells.
     #[serde(skip_serializing_if = "Option::is_none")]
     averaged: Option<Averaged>,
 }
+
+/// A label and its colour.
+#[derive(Serialize)]
+struct Label {
+    label: f64,
+    colour: String,
+}
+
+/// Labels that are printed, at most.
+const LISTED: usize = 24;
 
 impl Colours {
     /// Of a legend; `number` is that of the field that is shown, which may be one of several time steps.
@@ -124,15 +137,26 @@ impl Colours {
         Self {
             of: legend.label.clone(),
             map: scale.map.name,
-            range: scale.range,
+            range: match (legend.labels.first(), legend.labels.last()) {
+                (Some((least, _)), Some((most, _))) => [*least, *most],
+                _ => scale.range,
+            },
             log: scale.is_log,
             reversed: scale.is_reversed,
             bands: (scale.bands > 1).then_some(scale.bands),
+            labels: legend.labels.iter().map(|&(label, [r, g, b])| Label { label, colour: format!("#{r:02x}{g:02x}{b:02x}") }).collect(),
             averaged: field.and_then(|field| field.averaged.clone()),
         }
     }
 
     fn sentence(&self) -> String {
+        if !self.labels.is_empty() {
+            let words = self.labels.iter().take(LISTED).map(|Label { label, colour }| format!("{label} {colour}"));
+            let words = words.collect::<Vec<_>>().join(", ");
+            let rest = self.labels.len().saturating_sub(LISTED);
+            let more = if rest > 0 { format!(" and {rest} more: --json lists all") } else { String::new() };
+            return format!("labels of {}: {words}{more}", self.of);
+        }
         let [low, high] = output::ends(self.range);
         let log = if self.log { ", logarithmic" } else { "" };
         let reversed = if self.reversed { ", reversed" } else { "" };

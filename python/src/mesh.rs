@@ -1,6 +1,7 @@
 //! A mesh by itself, which no later request changes, and what is made of it: surfaces, values at points, streamlines, sums.
 
 use crate::array::Array;
+use crate::errors::Failure;
 use crate::watch::Watch;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -173,8 +174,12 @@ impl Mesh {
         field: usize,
         values: Vec<f64>,
         is_smooth: bool,
-    ) -> (Triangles, Array) {
-        py.detach(|| {
+    ) -> PyResult<(Triangles, Array)> {
+        if self.labels.get(field).is_some_and(|is_label| *is_label) {
+            let problem = "option `field`: it is a label, and between two labels there is no value; take the boundary or a slice";
+            return Err(Failure::new("bad-option", problem).into());
+        }
+        Ok(py.detach(|| {
             let view = self.view(field);
             let mut surface = IsoSurface::new();
             surface.set_normal_kind(if is_smooth { NormalKind::Smooth } else { NormalKind::Gradient });
@@ -191,7 +196,7 @@ impl Mesh {
             });
             let normals = Array::rows(surface.normals);
             ((Array::rows(surface.positions), Array::rows(surface.indices), arrays), normals)
-        })
+        }))
     }
 
     /// The section with the plane `normal · p = offset`, and the edges of cells in it.

@@ -181,7 +181,7 @@ class Mesh:
 
         ``normals``: ``"gradient"`` of the field, or ``"smooth"``, the mean over the triangles at a point.
 
-        Raises ``TetralodError`` (``bad-option``) if a value is not finite, or the mesh does not have the field.
+        Raises ``TetralodError`` (``bad-option``) if a value is not finite, the field is a label, or the mesh does not have it.
 
         >>> surface = ball.refine(error="1%").isosurface(0.5)
         >>> surface.triangles.shape[1], bool(np.allclose(surface.point_data["r"], 0.5))

@@ -34,11 +34,12 @@ impl Session {
     }
 
     /// Whether an isosurface of a field shows more than the boundary, and is shown first: where the domain fills the box around it but for a
-    /// fiftieth, as that of a grid, and the field is not linear, so that its isosurfaces are no planes. None if there is no such field, or before
+    /// fiftieth, as that of a grid, and the field is no label and not linear, so that its isosurfaces are no planes. None if there is no such field, or before
     /// the base mesh is there.
     pub fn surface_first(&self, field: usize) -> Option<bool> {
         let (mt, bounds) = (self.mt()?, self.bounds()?);
-        mt.info().fields.get(field).map(|_| fills(mt, bounds) && !is_linear(mt, field))
+        let info = mt.info().fields.get(field)?;
+        Some(!info.is_label && fills(mt, bounds) && !is_linear(mt, field))
     }
 }
 

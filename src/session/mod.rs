@@ -79,6 +79,14 @@ pub enum SessionError {
     /// The isovalue is not a finite number.
     #[error("the isovalue must be a finite number")]
     Isovalue,
+    /// An isosurface of a label.
+    #[error(
+        "'{name}' is a label: between two labels there is no value, so there is no isosurface; take its boundary, a section or a threshold"
+    )]
+    Label {
+        /// Its name.
+        name: String,
+    },
     /// The file keeps exact values, and they are not here.
     #[error(
         "the file keeps exact values behind its blocks, and they are not here: it is cut off, or has not arrived to its end"
@@ -364,7 +372,7 @@ impl Session {
     /// The isosurface of the current mesh, at a value in units of the field.
     ///
     /// # Errors
-    /// If the value is not a finite number, or nothing has arrived yet.
+    /// If the value is not a finite number, the field is a label, or nothing has arrived yet.
     pub fn isosurface(&mut self, value: f64) -> Result<&IsoSurface, SessionError> {
         self.isosurfaces(&[value])
     }
@@ -373,13 +381,16 @@ impl Session {
     /// again it costs what has changed; see [`IsoSurface::update`].
     ///
     /// # Errors
-    /// If a value is not a finite number, or nothing has arrived yet.
+    /// If a value is not a finite number, the field is a label, or nothing has arrived yet.
     pub fn isosurfaces(&mut self, values: &[f64]) -> Result<&IsoSurface, SessionError> {
         if self.front.is_none() {
             return Err(SessionError::NotReady);
         }
         if !values.iter().all(|value| value.is_finite()) {
             return Err(SessionError::Isovalue);
+        }
+        if let Some(label) = self.info().and_then(|info| info.fields.get(self.field)).filter(|f| f.is_label) {
+            return Err(SessionError::Label { name: label.name.clone() });
         }
         self.catch_up();
         let mesh = view(self.front.as_ref(), &self.shown);
@@ -635,7 +646,7 @@ impl crate::Coded for SessionError {
     fn code(&self) -> &'static str {
         match self {
             Self::NotReady | Self::ExactMissing => "not-ready",
-            Self::Request(_) | Self::Isovalue => "bad-option",
+            Self::Request(_) | Self::Isovalue | Self::Label { .. } => "bad-option",
             Self::Format(error) => error.code(),
         }
     }

@@ -77,6 +77,12 @@ impl BoundarySurface {
         self.points.iter().map(|p| field[*p as usize]).collect()
     }
 
+    /// Where each vertex is, as [`LabelParts`](super::LabelParts) takes it.
+    #[doc(hidden)]
+    pub fn edge_places(&self) -> Vec<([u32; 2], f64)> {
+        self.points.iter().map(|&point| ([point; 2], 0.0)).collect()
+    }
+
     /// The surface's area, in square model units.
     pub fn area(&self) -> f64 {
         area(&self.positions, &self.indices)

@@ -12,6 +12,7 @@ mod difference;
 pub mod gizmo;
 mod glyphs;
 mod iso;
+mod label_parts;
 mod marching;
 mod mesh_snapshot;
 mod moves;
@@ -52,6 +53,8 @@ pub use glyphs::ArrowLength;
 pub use glyphs::ArrowOptions;
 pub use iso::{IsoSurface, NormalKind};
 #[doc(hidden)]
+pub use label_parts::LabelParts;
+#[doc(hidden)]
 pub use moves::Slope;
 #[doc(hidden)]
 pub use pick::{MediumHit, SurfaceHit, first_hit, first_hit_in, first_hit_in_displaced, first_kept_hit};
@@ -59,7 +62,7 @@ pub use probe::Probe;
 #[doc(hidden)]
 pub use probe::{Place, Span};
 #[doc(hidden)]
-pub use region_palette::{region_color, region_scale};
+pub use region_palette::{label_value, region_color, region_scale};
 pub use slice::{Plane, Slice};
 #[doc(hidden)]
 pub use solids::Solids;
@@ -109,6 +112,7 @@ pub struct MeshView<'a> {
 }
 
 /// A field as slices: one number a point, and what it is between the points.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct FieldView<'a> {
     /// One value per point.

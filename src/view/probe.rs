@@ -60,7 +60,7 @@ impl Place {
         [0, 1, 2].map(|axis| (0..4).map(|i| self.weights[i] * corners[i][axis]).sum())
     }
 
-    /// The value of any field; of a label that of the corner with the largest coordinate, the least of several.
+    /// The value of any field, given by one number a point; it is linear between the corners.
     ///
     /// # Panics
     /// If the mesh has no such tetrahedron, or the field too few numbers.

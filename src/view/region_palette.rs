@@ -31,3 +31,24 @@ pub fn region_scale() -> ColourScale {
 pub fn region_color(place: u8) -> [u8; 3] {
     COLORS[usize::from(place) % COLORS.len()]
 }
+
+/// The value that a label has on that scale, where `least` is the least label of its field: colours come again after as many labels as there are
+/// colours, and do not depend on the mesh.
+pub fn label_value(label: f64, least: f64) -> f64 {
+    (label - least).rem_euclid(f64::from(REGION_COLORS)) + 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_have_the_colours_of_the_palette_in_turn() {
+        for i in 0..30_u8 {
+            let value = label_value(f64::from(i) - 7.0, -7.0);
+            let colour = region_color(i % REGION_COLORS).map(|c| f32::from(c) / 255.0);
+            let found = region_scale().colour(value);
+            assert!(found.iter().zip(colour).all(|(a, b)| (a - b).abs() < 1e-3), "{i}: {found:?}, {colour:?}");
+        }
+    }
+}

@@ -79,16 +79,27 @@ impl Slice {
         &self.values
     }
 
-    /// The value at each vertex of another field of the mesh that was sliced.
+    /// The value at each vertex of another field of the mesh that was sliced, given by one number a point.
     ///
     /// # Panics
     /// If there are fewer points or numbers than in the mesh that was sliced.
     pub fn interpolate<'f>(&self, mesh: &MeshView<'_>, field: impl Into<FieldView<'f>>) -> Vec<f64> {
-        let Some(plane) = &self.plane else { return Vec::new() };
         let field = field.into();
-        let list = self.pieces.crossings.list.iter();
-        list.map(|crossing| crossing.value(field, crossing.fraction(0.0, |p| plane.height_at(mesh, p))))
-            .collect()
+        self.crossings(mesh).map(|(crossing, t)| crossing.value(field, t)).collect()
+    }
+
+    /// On which edge of the mesh each vertex is, and how far along.
+    fn crossings(&self, mesh: &MeshView<'_>) -> impl Iterator<Item = (&Crossing, f64)> {
+        let list = self.plane.as_ref().map(|plane| (plane, self.pieces.crossings.list.iter()));
+        list.into_iter().flat_map(move |(plane, list)| {
+            list.map(move |crossing| (crossing, crossing.fraction(0.0, |p| plane.height_at(mesh, p))))
+        })
+    }
+
+    /// Where each vertex is, as [`LabelParts`](super::LabelParts) takes it.
+    #[doc(hidden)]
+    pub fn edge_places(&self, mesh: &MeshView<'_>) -> Vec<([u32; 2], f64)> {
+        self.crossings(mesh).map(|(crossing, t)| (crossing.ends, t)).collect()
     }
 
     /// Triangles, counter-clockwise when seen from where the normal points to.

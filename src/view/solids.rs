@@ -127,7 +127,8 @@ impl Solids {
         vertices <= MOST_VERTICES.saturating_sub(self.positions.len())
     }
 
-    /// The value at each vertex of a field of the mesh that the bodies stand in: that of the line or in the middle of the arrow.
+    /// The value at each vertex of a field of the mesh that the bodies stand in, given by one number a point: that of the line or in the
+    /// middle of the arrow.
     ///
     /// # Panics
     /// If there are fewer numbers than points in that mesh.

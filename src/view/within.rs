@@ -272,7 +272,7 @@ impl MeshWithin {
         &self.values
     }
 
-    /// Another field of the mesh that was cut, at all points of this one.
+    /// Another field of the mesh that was cut, given by one number a point, at all points of this one.
     ///
     /// # Panics
     /// If there are fewer numbers than points in the mesh that was cut.

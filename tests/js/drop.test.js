@@ -112,6 +112,32 @@ test("a dropped VTU is built and shown, a broken file leaves all as it is", asyn
   await page.close();
 });
 
+test("labels at cells stay labels: the boundary in their colours, and nothing between", async () => {
+  const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
+  await reach(page, "complete");
+  const labels = Array.from({ length: 1296 }, (_, i) => (Math.floor(i / 6) % 6 < 3 ? 2 : 40)).join(" ");
+  const text = gridFile(6, 700).replace(/"Float64" Name="stress"([^>]*)>[^<]*/, (_, more) => `"Int32" Name="material"${more}>${labels}`);
+  await drop(page, "cells.vtu", text);
+  const dialog = page.locator("dialog.build");
+  await dialog.getByRole("button", { name: "Build" }).click();
+  await page.waitForFunction(() => window.tetralodDemo.info?.tetrahedra === 1296 && window.tetralodDemo.state === "complete", undefined, { timeout: PATIENCE });
+  assert.match(await dialog.getByText("is averaged from cells").innerText(), /^material is averaged from cells: .*; another label in [\d.]+ % of a cell at most/);
+  await dialog.getByRole("button", { name: "Close" }).click();
+  const { isLabel, name } = await page.evaluate(() => window.tetralodDemo.info.fields[0]);
+  assert.deepEqual([isLabel, name], [true, "material"]);
+  assert.equal(await page.locator("input[name=mode]:checked").inputValue(), "solid", "there is no isosurface of a label");
+  const ticks = page.locator("#legend-ticks span:visible");
+  assert.deepEqual(await ticks.allInnerTexts(), ["2", "40"]);
+  assert.ok(await page.locator("#range").isHidden(), "a range means nothing");
+  const before = await still(page, "drop-labels");
+  await screenshot(page, "page-labels");
+  await page.locator("input[name=mode][value=iso]").check({ force: true });
+  await page.locator("#legend-note").getByText("labels have no values between: the boundary is shown").waitFor({ timeout: PATIENCE });
+  assert.ok(differing(before, await still(page, "drop-labels-iso")) < 0.1);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
 test("a field at cells is averaged, and the page says what that does to it", async () => {
   const page = await open("data/bucky-small.mt", undefined, { viewport: { width: 900, height: 620 } });
   await reach(page, "complete");

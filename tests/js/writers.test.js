@@ -208,6 +208,12 @@ test("glTF: colours of vertices are linear light, on the scale of the legend", a
   near(colours, [0, 0, 0, 0, 0, 0, 1, 0.215861, 0, 1, 1, 1, 1, 1, 1]);
   // Half of the way in sRGB is a fifth of the light.
   near(coloursOf(Float32Array.of(0.5), { ...legend, range: [0, 1], log: false, colours: ["#000000", "#ffffff"] }), [0.214041, 0.214041, 0.214041]);
+  // Labels have colours of their own, and none between.
+  const labels = [
+    { value: -3, colour: "#ff0000" },
+    { value: 9, colour: "#0000ff" },
+  ];
+  near(coloursOf(Float32Array.of(9, -3), { ...legend, labels }), [0, 0, 1, 1, 0, 0]);
   const bytes = await bytesOf(glb({ ...surface, colours: colours.subarray(0, 12) }));
   const { meshes, accessors } = JSON.parse(bytes.toString("utf8", 20, 20 + bytes.readUInt32LE(12)));
   const { type, componentType, count } = accessors[meshes[0].primitives[0].attributes.COLOR_0];

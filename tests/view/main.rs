@@ -15,6 +15,7 @@ mod integrals;
 mod iso_cases;
 mod iso_session;
 mod iso_update;
+mod labels;
 mod mixed;
 mod mixed_pictures;
 mod pick;

@@ -158,7 +158,8 @@ export function present(about, source, save = download) {
     const [caption, bar, list] = /** @type {Iterable<HTMLElement>} */ (legend.children);
     caption.textContent = detail.label;
     bar.style.background = `linear-gradient(to right, ${detail.colours.join(", ")})`;
-    const far = detail.ticks.filter(({ fraction }) => fraction === 0 || fraction === 1 || (fraction > 0.15 && fraction < 0.85));
+    const isFar = (/** @type {number} */ fraction) => fraction === 0 || fraction === 1 || (fraction > 0.15 && fraction < 0.85);
+    const far = detail.ticks.filter(({ fraction }) => detail.labels.length > 0 || isFar(fraction));
     list.replaceChildren(
       ...far.map(({ label, fraction }) => {
         const tick = document.createElement("li");

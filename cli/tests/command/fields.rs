@@ -1,6 +1,6 @@
 //! Promises of the command for several fields, time steps, fields at cells, units and precision.
 
-use crate::support::{Folder, bad, command, good, json, number, run, text};
+use crate::support::{Folder, bad, command, good, json, number, run, table, text};
 use std::fs;
 use std::fs::File;
 use tetralod::mesh::{Field, Grid, TetMesh, VectorPart};
@@ -427,4 +427,66 @@ fn the_standard_input_is_read() {
     let error = text(&refused.stderr);
     assert!(error.contains("standard input: reading it takes more memory than the 16 bytes"), "{error}");
     bad(2, &["build", &input, "-o", &mt, "--format", "vtk"], &["--format", "'-'"]);
+}
+
+#[test]
+fn labels_stay_labels_in_all_that_is_made_of_them() {
+    let folder = Folder::new("labels");
+    let [input, mt, out, points] = ["a.vtu", "a.mt", "out", "points.csv"].map(|name| folder.path(name));
+    let mut mesh = step(None, 1.0);
+    // Walls of 2 and of 7, and what is between them.
+    let label = |tet: &[u32; 4]| match tet.iter().map(|&v| mesh.positions[v as usize][0]).sum::<f64>() {
+        x if x < 1.0 => 2.0,
+        x if x < 3.0 => -3.0,
+        _ => 7.0,
+    };
+    let labels = mesh.tets.iter().map(label).collect();
+    mesh.cell_fields = vec![Field { integer: true, ..Field::new("material", labels) }];
+    write(&input, &mesh);
+    let built = ["build", &input, "-o", &mt, "--all-fields", "--cell-to-point"];
+    let told = good(&built);
+    assert!(told.contains("averaged from cells  material\n") && told.contains("  another label "), "{told}");
+    let info = json(&["info", &mt, "--json"]);
+    let labels: Vec<_> = info["fields"].as_array().expect("fields").iter().map(|f| &f["is_label"]).collect();
+    assert_eq!(labels.iter().filter(|is_label| **is_label == &serde_json::Value::Bool(true)).count(), 1);
+    let shown = good(&["info", &mt]);
+    assert!(shown.contains("material (label): -3 to 7") && shown.contains("  another label "), "{shown}");
+    assert!(good(&["verify", &mt, &input]).contains("every promise is kept"));
+    // In tables and files there is nothing between them.
+    let known = |values: &[f64]| values.iter().all(|value| [2.0, -3.0, 7.0].contains(value));
+    let between: Vec<String> = (1..40).map(|i| format!("{},0.31,0.77", f64::from(i) / 40.0)).collect();
+    fs::write(&points, between.join("\n")).expect("a file");
+    for command in [
+        &["probe", &mt, "--points", &points][..],
+        &["probe", &mt, "--line", "0,0,0,1,1.5,1.5"],
+        &["slice", &mt, "--plane", "1,0.3,0.2,0.6"],
+        &["isosurface", &mt, "--field", "p", "--iso", "0.8"],
+        &["surface", &mt],
+    ] {
+        let out = format!("{out}.csv");
+        good(&[command, &["-o", &out]].concat());
+        let (names, rows) = table(&out);
+        let column = names.iter().position(|name| name == "material").expect("a column");
+        let values: Vec<f64> = rows.iter().map(|row| row[column]).collect();
+        assert!(values.len() > 10 && known(&values), "{command:?}: {values:?}");
+        assert!(values.iter().any(|value| *value != values[0]), "{command:?}");
+    }
+    let vtu = format!("{out}.vtu");
+    good(&["extract", &mt, "-o", &vtu]);
+    let extracted = io::read(folder.path("out.vtu")).expect("a mesh");
+    let material = extracted.fields.iter().find(|field| field.name == "material").expect("a field");
+    assert!(material.integer && known(&material.values));
+    bad(1, &["isosurface", &mt, "--field", "material", "--iso", "1", "-o", &vtu], &["'material' is a label"]);
+    // What is said goes before the rule.
+    good(&[&built[..], &["--no-label", "material", "--quiet"]].concat());
+    assert!(!good(&["info", &mt]).contains("(label)"));
+    for (code, options, words) in [
+        (2, &["--label", "material", "--no-label", "material"][..], &["'material'", "--no-label"][..]),
+        (1, &["--label", "density"], &["'density'", "material"]),
+        (1, &["--label", "material", "--kind", "edge"], &["'material'", "kind edge"]),
+        (1, &["--label", "material", "--field-bits", "material=4"], &["'material'", "no precision"]),
+        (1, &["--label", "p"], &["'p' is no label"]),
+    ] {
+        bad(code, &[&built[..], options].concat(), words);
+    }
 }

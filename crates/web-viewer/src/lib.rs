@@ -44,6 +44,10 @@ const SAMPLES: u32 = 8;
 /// Ticks of the legend, at most, and its colours.
 const TICKS: usize = 7;
 const COLOURS: usize = 32;
+/// Colours of a legend of labels, about: each label has as many, so that there is no gradient between two of them.
+const STEPS: usize = 240;
+/// Labels that have a tick, at most.
+const LABELS: usize = 24;
 
 /// An MT and its picture on a canvas.
 #[wasm_bindgen]
@@ -391,24 +395,37 @@ impl Viewer {
 
     /// What the colours mean; nothing where nothing is coloured by values.
     pub fn legend(&self) -> Option<JsLegend> {
-        let Legend { label, scale, apart } = self.scene.legend()?;
-        let colours = scale.table::<COLOURS>();
-        let colours =
-            colours.iter().map(|[red, green, blue, _]| format!("#{red:02x}{green:02x}{blue:02x}").into());
-        let ticks = scale.ticks(TICKS).into_iter().map(|tick| {
-            let fraction = scale.fraction(tick.value);
-            object(&[
-                ("value", tick.value.into()),
-                ("label", tick.label.into()),
-                ("fraction", fraction.into()),
-            ])
-        });
+        let Legend { label, scale, labels, apart } = self.scene.legend()?;
+        let css = |[red, green, blue]: [u8; 3]| JsValue::from(format!("#{red:02x}{green:02x}{blue:02x}"));
+        let tick = |value: f64, label: String, fraction: f64| {
+            object(&[("value", value.into()), ("label", label.into()), ("fraction", fraction.into())])
+        };
+        let (colours, ticks): (Vec<JsValue>, Vec<JsValue>) = if labels.is_empty() {
+            let colours = scale.table::<COLOURS>().map(|[red, green, blue, _]| css([red, green, blue]));
+            let ticks = scale.ticks(TICKS).into_iter();
+            let ticks = ticks.map(|of| tick(of.value, of.label, scale.fraction(of.value)));
+            (colours.to_vec(), ticks.collect())
+        } else {
+            let each = (STEPS / labels.len()).max(1);
+            let colours = labels.iter().flat_map(|(_, colour)| std::iter::repeat_n(css(*colour), each));
+            let middle = |i: usize| (i as f64 + 0.5) / labels.len() as f64;
+            let ticks = labels.iter().enumerate().step_by(labels.len().div_ceil(LABELS));
+            let ticks = ticks.map(|(i, (value, _))| tick(*value, value.to_string(), middle(i)));
+            (colours.collect(), ticks.collect())
+        };
+        let range = match (labels.first(), labels.last()) {
+            (Some((least, _)), Some((most, _))) => [*least, *most],
+            _ => scale.range,
+        };
+        let labels =
+            labels.iter().map(|(value, colour)| object(&[("value", (*value).into()), ("colour", css(*colour))]));
         Some(object(&[
             ("label", label.as_str().into()),
-            ("range", list(&scale.range)),
+            ("range", list(&range)),
             ("log", scale.is_log.into()),
-            ("colours", objects(colours)),
-            ("ticks", objects(ticks)),
+            ("colours", objects(colours.into_iter())),
+            ("ticks", objects(ticks.into_iter())),
+            ("labels", objects(labels)),
             ("apart", (*apart).into()),
         ]))
     }

@@ -134,16 +134,26 @@ impl IsoSurface {
         self.rebuild(mesh, distinct(values));
     }
 
-    /// The value at each vertex of another field of the mesh that the surface was made of.
+    /// The value at each vertex of another field of the mesh that the surface was made of, given by one number a point.
     ///
     /// # Panics
     /// If there are fewer points or numbers than in that mesh.
     pub fn interpolate<'f>(&self, mesh: &MeshView<'_>, field: impl Into<FieldView<'f>>) -> Vec<f64> {
         let field = field.into();
-        let value = |crossing: &Crossing| {
-            crossing.value(field, fraction(crossing, mesh, self.isovalues[crossing.which as usize]))
-        };
-        self.pieces.crossings.list.iter().map(value).collect()
+        self.crossings(mesh).map(|(crossing, t)| crossing.value(field, t)).collect()
+    }
+
+    /// On which edge of the mesh each vertex is, and how far along.
+    fn crossings(&self, mesh: &MeshView<'_>) -> impl Iterator<Item = (&Crossing, f64)> {
+        let isovalue = |crossing: &Crossing| self.isovalues[crossing.which as usize];
+        let list = self.pieces.crossings.list.iter();
+        list.map(move |crossing| (crossing, fraction(crossing, mesh, isovalue(crossing))))
+    }
+
+    /// Where each vertex is, as [`LabelParts`](super::LabelParts) takes it.
+    #[doc(hidden)]
+    pub fn edge_places(&self, mesh: &MeshView<'_>) -> Vec<([u32; 2], f64)> {
+        self.crossings(mesh).map(|(crossing, t)| (crossing.ends, t)).collect()
     }
 
     /// At each vertex the slope of vectors, given by their components along x, y and z, one number a point: the mean over the

@@ -89,6 +89,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   await Promise.all([viewer.keep(), viewer.set({ compare: { at: 0.3, difference: true } }), viewer.freeze(), viewer.freeze(false)]);
   await viewer.keep(await viewer.mesh({ fields: true }), { reach: 0.1 });
   viewer.legend?.apart satisfies number | undefined;
+  viewer.legend?.labels satisfies { value: number; colour: string }[] | undefined;
   const blocks: BlockMap | undefined = await viewer.blockMap();
   [blocks?.bounds.length, blocks?.states[0]] satisfies (number | undefined)[];
   const [{ tets }, slice] = await Promise.all([viewer.mesh(), viewer.slice([0, 0, 1], 0.5)]);

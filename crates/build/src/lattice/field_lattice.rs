@@ -130,7 +130,7 @@ pub fn mark_labels(
     if let Err(name) = mesh.mark_labels(given, by_rule) {
         let fields = mesh.fields.iter().chain(&mesh.cell_fields);
         let known = fields.map(|field| field.name.clone()).collect();
-        return Err(BuildError::UnknownField { name: name.to_owned(), known });
+        return Err(BuildError::UnknownLabel { name: name.to_owned(), known });
     }
     let is_given = |field: &Field| given.iter().any(|(name, _)| field.answers_to(name));
     let is_precise = |field: &Field| config.precision_of.iter().any(|(name, _)| field.answers_to(name));

@@ -30,6 +30,8 @@ const NORMALS: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.62, -0.41,
 ///   within [`MtInfo::field_bound`] of the input's value.
 /// - **Sections and isosurfaces**: every vertex lies on the exact one, with its value, and the area is that of the exact one.
 ///
+/// Labels have no isosurfaces; their values at other places are those of the nearest corner.
+///
 /// All must have arrived.
 pub fn run_shown(session: &mut Session, input: &TetMesh, reference: Reference) -> VerifyReport {
     VerifyReport::of(|report| check(session, input, reference, report))
@@ -77,7 +79,10 @@ fn check(
             // All of them in turn.
             let (normal, part) = (NORMALS[(f + round) % NORMALS.len()], VALUES[(f + round) % VALUES.len()]);
             check("a section", exact.check_section(session, normal, &mut numbers).map_err(failed)?);
-            check("an isosurface", exact.check_isosurface(session, part).map_err(failed)?);
+            // A label has none.
+            if !field.is_label {
+                check("an isosurface", exact.check_isosurface(session, part).map_err(failed)?);
+            }
         }
     }
     Ok(())
@@ -247,7 +252,9 @@ impl<'a> Exact<'a> {
         let points: Vec<[f64; 3]> = chosen.iter().map(|&v| place(positions[v])).collect();
         let mesh = session.view();
         for (&v, place) in chosen.iter().zip(Probe::new(mesh).locate_all(&points)) {
-            let off = place.map_or(0.0, |place| (place.value(&mesh) - values[v]).abs());
+            // The error of a label is that of what is linear between its corners, too.
+            let linear = |place: Place| place.interpolate(&mesh, mesh.field);
+            let off = place.map_or(0.0, |place| (linear(place) - values[v]).abs());
             if off > bound + 2.0 * self.rounding.value {
                 return Err(format!("vertex {v} at {:?} is {off} off, more than {bound}", positions[v]));
             }
@@ -272,7 +279,11 @@ impl<'a> Exact<'a> {
                 let claim = &claims[i as usize];
                 let linear = linear.get_or_insert_with(|| self.linear(tet));
                 if depth(&linear.corners, claim.place) >= -self.rounding.place {
-                    let ratio = (linear.at(claim.place) - claim.value).abs() / self.allowed(linear);
+                    let ratio = match self.field.is_label {
+                        true if linear.has_label(claim, self.rounding.place) => 0.0,
+                        true => f64::INFINITY,
+                        false => (linear.at(claim.place) - claim.value).abs() / self.allowed(linear),
+                    };
                     least[i as usize] = least[i as usize].min(ratio);
                 }
             });
@@ -283,6 +294,8 @@ impl<'a> Exact<'a> {
                 let (p, value) = (self.origin + claims[i].place, self.field.origin + claims[i].value);
                 let what = if ratio.is_finite() {
                     format!("{ratio:.1} times what rounding allows off")
+                } else if self.field.is_label {
+                    "not the label of the nearest corner, or outside".to_owned()
                 } else {
                     "outside".to_owned()
                 };
@@ -370,6 +383,21 @@ impl<'a> Exact<'a> {
 impl Linear {
     fn at(&self, p: DVec3) -> f64 {
         self.values[0] + self.gradient.dot(p - self.corners[0])
+    }
+
+    /// Whether a corner with the label of a claim is as near as any other, but for what moving the place by `rounding` does.
+    fn has_label(&self, claim: &Claim, rounding: f64) -> bool {
+        // The barycentric coordinate of each corner, and by how much it may be another one.
+        let shares = [0, 1, 2, 3].map(|i| {
+            let [a, b, c] = FACES[i].map(|k| self.corners[k]);
+            let normal = (c - a).cross(b - a);
+            let whole = normal.dot(self.corners[i] - a);
+            (normal.dot(claim.place - a) / whole, rounding * normal.length() / whole.abs())
+        });
+        let least = |(share, slack): &(f64, f64)| share - slack;
+        let largest = shares.iter().map(least).fold(f64::NEG_INFINITY, f64::max);
+        let has = |i: usize| (self.values[i] - claim.value).abs() < 0.5;
+        (0..4).any(|i| has(i) && shares[i].0 + shares[i].1 >= largest)
     }
 }
 

@@ -230,7 +230,7 @@ fn labels_are_exact_or_refused() {
     let name = "tag".to_owned();
     assert_eq!(marked(&[("tag", true)], &config), Err(BuildError::Label { name, at: 1, value: 0.5 }));
     let unknown = marked(&[("nothing", true)], &config);
-    assert!(matches!(unknown, Err(BuildError::UnknownField { name, .. }) if name == "nothing"));
+    assert!(matches!(unknown, Err(BuildError::UnknownLabel { name, .. }) if name == "nothing"));
 }
 
 #[test]

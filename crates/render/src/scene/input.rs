@@ -11,7 +11,7 @@ use tetralod::geom::{Bounds, SingleValues};
 use tetralod::mesh::NONE;
 use tetralod::mt::{MeshChanges, MtInfo, Regions, numbers_of};
 use tetralod::session::{Session, TetQuantity};
-use tetralod::view::{ColourScale, Difference, FieldView, MeshView};
+use tetralod::view::{ColourScale, Difference, MeshView, region_scale};
 
 /// What was computed last of a session's mesh before any object.
 #[derive(Debug, Default)]
@@ -183,11 +183,14 @@ impl<'a> Input<'a> {
         field_number(self.info, self.shown, what, name)
     }
 
-    /// The colours of a field; the range of the state is for the field that is shown.
+    /// The colours of a field; the range of the state is for the field that is shown. Labels have those of the palette, whatever the state says.
     pub fn scale(&self, field: usize) -> Result<ColourScale> {
         if let Some(largest) = self.largest_difference.filter(|_| field == self.shown) {
             let most = if largest > 0.0 { largest } else { 1.0 };
             return scale(&ColourState { log: false, ..self.state.colours.clone() }, None, [-most, most]);
+        }
+        if self.is_label(field) {
+            return Ok(region_scale());
         }
         let own = self.info.range_at_all_times(field);
         scale(&self.state.colours, if field == self.shown { self.state.colours.range } else { None }, own)
@@ -197,6 +200,8 @@ impl<'a> Input<'a> {
     pub fn single(&self, field: usize) -> SingleValues {
         match self.largest_difference.filter(|_| field == self.shown) {
             Some(largest) => SingleValues::of([-largest, largest], 0.0),
+            // What is drawn of labels are their colours.
+            None if self.is_label(field) => SingleValues::PLAIN,
             None => self.info.fields[field].single_values(),
         }
     }
@@ -210,10 +215,10 @@ impl<'a> Input<'a> {
         [0.0, names.iter().map(largest).fold(0.0, f64::hypot)]
     }
 
-    /// Values of a field, or of a difference, with what is between them.
-    pub fn of<'f>(&self, field: usize, values: &'f [f64]) -> FieldView<'f> {
+    /// Whether what colours by a field are labels.
+    pub fn is_label(&self, field: usize) -> bool {
         let is_difference = field == self.shown && self.largest_difference.is_some();
-        FieldView { values, is_label: self.info.fields[field].is_label && !is_difference }
+        self.info.fields[field].is_label && !is_difference
     }
 
     /// What colours by a field: its values, or the difference.

@@ -7,6 +7,7 @@
 mod error;
 mod input;
 mod kept;
+mod labels;
 mod legend;
 mod moves;
 mod objects;
@@ -205,6 +206,11 @@ impl Scene {
     fn within(&self, session: &Session) -> Result<Option<Within>, SceneError> {
         let (Some(threshold), Some(info)) = (&self.state.threshold, session.info()) else { return Ok(None) };
         let field = input::field_number(info, session.field(), "threshold.field", threshold.field.as_ref())?;
+        let (name, is_label) = (&info.fields[field].name, info.fields[field].is_label);
+        if threshold.cut && is_label {
+            let problem = format!("'{name}' is a label: nothing can be cut between two labels; leave `cut` out");
+            return Err(SceneError::state("threshold.cut", problem));
+        }
         Ok(Some(Within { field, range: threshold.range, is_cut: threshold.cut }))
     }
 

@@ -2,6 +2,7 @@
 
 use super::error::Result;
 use super::input::Input;
+use super::labels;
 use super::moves::Moves;
 use super::state::{ArrowState, BoundaryState, Colour, ColourBy, IsosurfaceState, StreamlineState};
 use super::styles::{cell_style, clips, isosurface_style, medium, other_clips, range, scale};
@@ -14,7 +15,7 @@ use tetralod::mesh::NONE;
 use tetralod::mt::MeshChanges;
 use tetralod::session::TetQuantity;
 use tetralod::view::{
-    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, IsoSurface, MeshView, Slice, Slope, Solids,
+    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, FieldView, IsoSurface, LabelParts, MeshView, Slice, Slope, Solids,
     SurfaceChanges, TraceOptions, Tracer, Triangles, TubeOptions, region_color, region_scale,
 };
 
@@ -51,6 +52,8 @@ pub(super) struct Objects {
     pub(super) arrows: Displaced<Solids>,
     /// Where the points of the mesh go.
     pub(super) moves: Vec<[f64; 3]>,
+    /// The values of the colours of tetrahedra by the labels at their corners.
+    cell_labels: Vec<f64>,
     legend: Option<Legend>,
     /// How the values of the mesh are stored where it is drawn.
     single: SingleValues,
@@ -61,6 +64,8 @@ pub(super) struct Objects {
 pub(super) struct Displaced<S> {
     pub(super) surface: S,
     pub(super) moves: Vec<[f64; 3]>,
+    /// What is drawn of it where a label colours it.
+    parts: LabelParts,
 }
 
 /// The boundary of all regions that look the same.
@@ -80,6 +85,8 @@ pub(super) struct Isosurface {
     changes: SurfaceChanges,
     /// The values of the field that colours it, if one does.
     values: Vec<f64>,
+    /// What is drawn of it where that is a label.
+    parts: LabelParts,
     /// Whether all of it is drawn, so that changes are enough.
     is_whole: bool,
 }
@@ -92,6 +99,8 @@ pub(super) struct Section {
     /// The values of another field than the one that is shown, if that colours it.
     values: Vec<f64>,
     inner_sides: Vec<u8>,
+    /// What is drawn of it where a label colours it.
+    parts: LabelParts,
 }
 
 impl Objects {
@@ -121,15 +130,17 @@ impl Objects {
             tubes,
             arrows,
             moves,
+            cell_labels,
             legend,
             single,
         } = self;
+        labels::check(input)?;
         let by = &Moves::of(input)?;
         *moves = by.as_ref().map_or_else(Vec::new, Moves::at_points);
         let stored = input.single(input.shown);
         let is_stored_anew = std::mem::replace(single, stored) != stored;
         edits.push(Edit::Values(stored));
-        list_cells(input, legend, edits)?;
+        list_cells(input, cell_labels, legend, edits)?;
         // The colours of a difference are those of its range, which changes with the mesh.
         if is_stale || is_stored_anew || input.largest_difference.is_some() {
             edits.push(volume(input)?);
@@ -152,14 +163,21 @@ impl Objects {
     }
 }
 
-fn list_cells<'a>(input: &Input<'a>, legend: &mut Option<Legend>, edits: &mut Edits<'a>) -> Result<()> {
+fn list_cells<'a>(
+    input: &Input<'a>,
+    cell_labels: &'a mut Vec<f64>,
+    legend: &mut Option<Legend>,
+    edits: &mut Edits<'a>,
+) -> Result<()> {
     let Some(cells) = &input.state.cells else {
         edits.push(Edit::Cells(None));
         return Ok(());
     };
     let quantity = input.quantity()?;
-    if quantity.is_some() {
-        edits.push(Edit::CellValues(input.tet_values));
+    let has_labels = quantity.is_none() && input.is_label(input.shown);
+    *cell_labels = if has_labels { labels::of_tets(input, input.shown) } else { Vec::new() };
+    if quantity.is_some() || has_labels {
+        edits.push(Edit::CellValues(if has_labels { cell_labels.as_slice() } else { input.tet_values }));
     }
     let scale = match quantity {
         Some(TetQuantity::Region) => region_scale(),
@@ -168,8 +186,13 @@ fn list_cells<'a>(input: &Input<'a>, legend: &mut Option<Legend>, edits: &mut Ed
     };
     // Colours of regions mean no values.
     let named = quantity.filter(|quantity| *quantity != TetQuantity::Region);
-    *legend = named.map(|quantity| Legend { label: quantity.name().to_owned(), scale, apart: 0 });
-    edits.push(Edit::Cells(Some(cell_style(cells, scale, quantity.is_some()))));
+    *legend = named.map(|quantity| Legend {
+        label: quantity.name().to_owned(),
+        scale,
+        labels: Vec::new(),
+        apart: 0,
+    });
+    edits.push(Edit::Cells(Some(cell_style(cells, scale, quantity.is_some() || has_labels))));
     Ok(())
 }
 
@@ -220,8 +243,9 @@ impl Isosurface {
         self.changes = self.surface.take_changes();
         let is_coloured = state.field.is_some() || input.largest_difference.is_some();
         let coloured = is_coloured.then(|| input.field("isosurfaces", state.field.as_ref())).transpose()?;
-        let values = coloured
-            .map(|field| self.surface.interpolate(&mesh, input.of(field, &input.values(field))));
+        let label = coloured.filter(|field| input.is_label(*field));
+        let values = coloured.filter(|_| label.is_none());
+        let values = values.map(|field| self.surface.interpolate(&mesh, &*input.values(field)));
         self.values = values.unwrap_or_default();
         let scale = coloured.map(|field| input.scale(field)).transpose()?;
         (self.moves, self.slopes) = by.as_ref().map_or_else(Default::default, |by| {
@@ -230,11 +254,18 @@ impl Isosurface {
             (moves, slopes.map(|slope| by.scaled(slope)).collect())
         });
         self.is_whole = coloured.is_none() && by.is_none();
+        let parts =
+            label.map(|field| labels::parts(&self.triangles(), &self.surface.edge_places(&mesh), input, field));
+        self.parts = parts.unwrap_or_default();
         let own: &'a Self = self;
         let single = coloured.map_or(SingleValues::PLAIN, |field| input.single(field));
+        let triangles = match label {
+            Some(_) => own.parts.triangles(),
+            None => Triangles { values: &own.values, single, ..own.triangles() },
+        };
         Ok(Edit::Surface {
             key,
-            triangles: Triangles { values: &own.values, single, ..own.triangles() },
+            triangles,
             changes: (was_whole && own.is_whole).then_some(&own.changes),
             style: isosurface_style(state, scale),
         })
@@ -259,6 +290,22 @@ where
     }
 }
 
+impl Displaced<BoundarySurface> {
+    /// What is drawn of it by the field that is shown: in parts if that is a label.
+    fn coloured<'a>(&'a mut self, input: &Input<'_>, is_by_field: bool) -> Triangles<'a> {
+        let is_label = is_by_field && input.is_label(input.shown);
+        self.parts = match is_label {
+            true => labels::parts(&self.triangles(), &self.surface.edge_places(), input, input.shown),
+            false => LabelParts::default(),
+        };
+        let own: &'a Self = self;
+        match is_label {
+            true => own.parts.triangles(),
+            false => Triangles { single: input.single(input.shown), ..own.triangles() },
+        }
+    }
+}
+
 impl Section {
     /// Cuts `mesh`: that of the input, or some of its tetrahedra.
     fn update<'a>(
@@ -272,8 +319,9 @@ impl Section {
         let field = input.field("slices", state.field.as_ref())?;
         let plane = state.plane();
         self.slice.extract(mesh, &plane.plane());
-        let is_other = field != input.shown;
-        let values = is_other.then(|| self.slice.interpolate(mesh, input.of(field, &(input.fields)(field))));
+        let is_label = input.is_label(field);
+        let is_other = field != input.shown && !is_label;
+        let values = is_other.then(|| self.slice.interpolate(mesh, &*(input.fields)(field)));
         self.values = values.unwrap_or_default();
         let moves = by.as_ref().map(|by| by.at(|component| self.slice.interpolate(mesh, component)));
         self.moves = moves.unwrap_or_default();
@@ -285,11 +333,17 @@ impl Section {
             edges: state.edges.then(EdgeLook::default),
             clips: if state.clipped { other_clips(&clips(input.state), &plane.clip()) } else { 0 },
         };
+        let whole = Triangles { inner_sides: &self.inner_sides, ..self.triangles() };
+        let parts = is_label.then(|| labels::parts(&whole, &self.slice.edge_places(mesh), input, field));
+        self.parts = parts.unwrap_or_default();
         let own: &'a Self = self;
         let mut triangles = Triangles { inner_sides: &own.inner_sides, ..own.triangles() };
         triangles.single = input.single(field);
         if is_other {
             triangles.values = &own.values;
+        }
+        if is_label {
+            triangles = own.parts.triangles();
         }
         Ok(Edit::Surface { key, triangles, changes: None, style })
     }
@@ -343,11 +397,10 @@ fn list_boundary<'a>(
     let by_look = |a: &RegionLook, b: &RegionLook| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
     let looks = distinct(of_region.clone(), by_look);
     resize(groups, looks.len(), REGIONS, edits);
-    let single = input.single(input.shown);
     if looks.is_empty() {
         own.surface.extract(&input.mesh);
         own.follow(by, BoundarySurface::interpolate);
-        let triangles = Triangles { single, ..own.triangles() };
+        let triangles = own.coloured(input, boundary.colour.is_none());
         edits.push(Edit::Surface { key: BOUNDARY, triangles, changes: None, style });
     } else {
         edits.push(Edit::Remove(BOUNDARY));
@@ -364,7 +417,7 @@ fn list_boundary<'a>(
         let colouring =
             color.map_or(style.colouring, |color| Colouring::Sides([Colour(region_color(color)).rgb(); 2]));
         let style = Style { colouring, opacity: opacity as f32, ..style };
-        let triangles = Triangles { single, ..part.triangles() };
+        let triangles = part.coloured(input, boundary.colour.is_none() && color.is_none());
         edits.push(Edit::Surface { key, triangles, changes: None, style });
     }
     list_caps(caps, boundary, input, by, edits)
@@ -449,8 +502,8 @@ fn streamlines<'a>(
         None => own.surface.set_tubes(&lines, &options),
         Some(field) => {
             let numbers = (input.fields)(field);
-            let values = input.of(field, &numbers);
-            own.surface.set_tubes_with(&lines, &options, |point| point.place.interpolate(&input.mesh, values));
+            let mesh = MeshView { field: &numbers, is_label: false, ..input.mesh };
+            own.surface.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
         }
     }
     own.follow(by, |tubes, component| tubes.interpolate(&input.mesh, component));
@@ -474,8 +527,7 @@ fn arrow_list<'a>(
         length: if *constant { ArrowLength::Constant } else { ArrowLength::Magnitude },
     };
     let components = [&*vectors[0], &vectors[1], &vectors[2]];
-    let coloured_by = values.zip(numbers.as_deref()).map(|(field, values)| input.of(field, values));
-    own.surface.set_arrows(input.mesh, components, coloured_by, &options);
+    own.surface.set_arrows(input.mesh, components, numbers.as_deref().map(FieldView::from), &options);
     own.follow(by, |arrows, component| arrows.interpolate(&input.mesh, component));
     solids(own, input, ARROWS, values, ("magnitude", input.lengths(fields)), legend)
 }
@@ -498,7 +550,7 @@ fn solids<'a>(
     };
     let label = field.map_or(own, |field| &input.info.fields[field].name).to_owned();
     // Where nothing else is coloured by values, the legend is theirs.
-    legend.get_or_insert(Legend { label, scale, apart: 0 });
+    legend.get_or_insert(Legend { label, scale, labels: Vec::new(), apart: 0 });
     let style = Style { colouring: Colouring::Scale(scale), ..Style::default() };
     Ok(Edit::Surface { key, triangles, changes: None, style })
 }
@@ -527,7 +579,8 @@ fn update_legend(shown: &mut Option<Legend>, input: &Input<'_>) -> Result<()> {
         let is_difference = field == input.shown && input.largest_difference.is_some();
         let label = if is_difference { format!("difference of {name}") } else { name.clone() };
         let apart = if is_difference { input.apart } else { 0 };
-        input.scale(field).map(|scale| Legend { label, scale, apart })
+        let labels = if input.is_label(field) { labels::present(input, field) } else { Vec::new() };
+        input.scale(field).map(|scale| Legend { label, scale, labels, apart })
     };
     *shown = field.map(legend).transpose()?;
     Ok(())
