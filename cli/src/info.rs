@@ -238,7 +238,8 @@ fn report(opened: &Opened, is_read: bool) -> Result<Report> {
     let [[x0, y0, z0], [x1, y1, z1]] = found.or_else(stated).context("the file has no base mesh")?;
     let structure = structure.map(|(structure, _)| structure);
     let field = |(number, field): (usize, &FieldInfo)| {
-        let FieldInfo { name, unit, vector, is_label, time, min, max, bits, quantization, .. } = field.clone();
+        let FieldInfo { name, unit, vector, is_label, time, min, max, bits, quantization, .. } =
+            field.clone();
         let (extremes, averaged) = (field.extremes.clone(), field.averaged.clone());
         let floor = info.floor(number);
         let (histogram, curve) = (opened.session.decoder().histogram(number), curve(opened, number));

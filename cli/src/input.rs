@@ -195,8 +195,7 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
         mesh.expand_grid();
     }
     if !mesh.is_grid_alone() {
-        let is_label =
-            |field: &Field| fields.iter().any(|info| info.is_label && info.is_of(field));
+        let is_label = |field: &Field| fields.iter().any(|info| info.is_label && info.is_of(field));
         for field in mesh.fields.iter_mut().chain(&mut mesh.cell_fields) {
             field.is_label = is_label(field);
         }

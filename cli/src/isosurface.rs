@@ -50,7 +50,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let seconds = start.elapsed().as_secs_f64();
     let deformed = arguments.deform.of(&arguments.query, &answer)?;
     let mesh = answer.opened.session.view();
-    let mut values: Vec<Vec<f64>> = views.into_iter().map(|field| surface.interpolate(&mesh, field)).collect();
+    let mut values: Vec<Vec<f64>> =
+        views.into_iter().map(|field| surface.interpolate(&mesh, field)).collect();
     // Of its own field they are the isovalues, without rounding.
     values[answer.field].clone_from(&surface.values);
     let (deformation, displaced) = deformed.unzip();

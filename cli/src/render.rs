@@ -144,14 +144,19 @@ impl Colours {
             log: scale.is_log,
             reversed: scale.is_reversed,
             bands: (scale.bands > 1).then_some(scale.bands),
-            labels: legend.labels.iter().map(|&(label, [r, g, b])| Label { label, colour: format!("#{r:02x}{g:02x}{b:02x}") }).collect(),
+            labels: legend
+                .labels
+                .iter()
+                .map(|&(label, [r, g, b])| Label { label, colour: format!("#{r:02x}{g:02x}{b:02x}") })
+                .collect(),
             averaged: field.and_then(|field| field.averaged.clone()),
         }
     }
 
     fn sentence(&self) -> String {
         if !self.labels.is_empty() {
-            let words = self.labels.iter().take(LISTED).map(|Label { label, colour }| format!("{label} {colour}"));
+            let words =
+                self.labels.iter().take(LISTED).map(|Label { label, colour }| format!("{label} {colour}"));
             let words = words.collect::<Vec<_>>().join(", ");
             let rest = self.labels.len().saturating_sub(LISTED);
             let more = if rest > 0 { format!(" and {rest} more: --json lists all") } else { String::new() };

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use tetralod::mesh::NONE;
 use tetralod::session::Session;
 use tetralod::view::{
-    BoundarySurface, FieldStats, FieldView, Histogram, IsoSurface, MeshView, NormalKind, Place, Plane, Probe, Slice,
-    StreamPoint, TraceOptions, Tracer,
+    BoundarySurface, FieldStats, FieldView, Histogram, IsoSurface, MeshView, NormalKind, Place, Plane, Probe,
+    Slice, StreamPoint, TraceOptions, Tracer,
 };
 
 /// A mesh with the values of some fields at its points.
@@ -129,8 +129,7 @@ impl Mesh {
     fn arrays(&self, of: impl Fn(FieldView<'_>) -> Vec<f64>) -> Vec<Array> {
         let array = |Group { fields, values }: &Group| {
             let components = fields.iter().zip(values.chunks_exact(self.positions.len().max(1)));
-            let views =
-                components.map(|(&field, values)| FieldView { values, is_label: self.labels[field] });
+            let views = components.map(|(&field, values)| FieldView { values, is_label: self.labels[field] });
             Array::components(views.flat_map(&of).collect(), fields.len())
         };
         self.groups.iter().map(array).collect()

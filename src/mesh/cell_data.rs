@@ -172,13 +172,7 @@ impl TetMesh {
     }
 
     /// What averaging has done: the values of a field of cells have become `means` at points, and in further regions.
-    fn averaged(
-        &self,
-        field: &Field,
-        means: &[f64],
-        volumes: &[f64],
-        parting: &Parting,
-    ) -> Option<Averaged> {
+    fn averaged(&self, field: &Field, means: &[f64], volumes: &[f64], parting: &Parting) -> Option<Averaged> {
         let values = &field.values;
         let mut ends: Option<[Range<usize>; 2]> = None;
         let (mut largest, mut squares, mut whole) = (0.0_f64, 0.0, 0.0);
@@ -238,7 +232,7 @@ impl TetMesh {
         &self,
         parting: &Parting,
     ) -> impl Iterator<Item = (Range<usize>, impl Iterator<Item = usize>)> {
-        self.cells().map(|cell| {
+        self.cells().map(move |cell| {
             let region = parting.regions[cell.start];
             let mut corners: Vec<u32> = self.tets[cell.clone()].as_flattened().to_vec();
             corners.sort_unstable();

@@ -98,9 +98,8 @@ pub struct VectorPart {
 /// Where among fields that one is which is kept where none is asked for: the first that is no label, does not number something or say where
 /// it is, and is no component; else the first.
 pub fn default_field(fields: &[Field], labels: &[String]) -> Option<usize> {
-    let tells = |field: &Field| {
-        !field.is_label && !is_number_or_place(&field.name) && !labels.contains(&field.name)
-    };
+    let tells =
+        |field: &Field| !field.is_label && !is_number_or_place(&field.name) && !labels.contains(&field.name);
     let is_whole = |field: &Field| field.vector.as_ref().is_none_or(|part| part.component.is_none());
     let first = |wanted: &dyn Fn(&Field) -> bool| fields.iter().position(wanted);
     first(&|field| tells(field) && is_whole(field)).or_else(|| first(&tells)).or_else(|| first(&|_| true))

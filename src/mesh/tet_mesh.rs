@@ -99,7 +99,8 @@ impl TetMesh {
         for fields in [&mut self.fields, &mut self.cell_fields] {
             for field in fields.iter_mut() {
                 let said = given.iter().find(|(name, _)| field.answers_to(name));
-                field.is_label = said.map_or_else(|| by_rule && field.is_label_by_rule(), |(_, is_label)| *is_label);
+                field.is_label =
+                    said.map_or_else(|| by_rule && field.is_label_by_rule(), |(_, is_label)| *is_label);
             }
             let none: HashSet<String> =
                 fields.iter().filter(|field| !field.is_label).map(|field| field.name.clone()).collect();

@@ -582,7 +582,8 @@ impl Session {
             return;
         }
         let cut = MeshWithin::of(&whole, &by, range);
-        let values = if field == self.field { cut.values().to_vec() } else { cut.interpolate(whole.own_field()) };
+        let values =
+            if field == self.field { cut.values().to_vec() } else { cut.interpolate(whole.own_field()) };
         let MeshView { positions, tets, .. } = cut.view(&values);
         let tets = std::iter::once(0..tets.len() as u32).collect();
         let all = MeshChanges { tets, ..MeshChanges::of_all_vertices(positions.len()) };

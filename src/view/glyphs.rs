@@ -74,7 +74,8 @@ impl Solids {
     ) -> usize {
         self.clear();
         let points = mesh.positions.len();
-        let is_complete = vectors.into_iter().chain(field.map(|field| field.values)).all(|numbers| numbers.len() >= points);
+        let is_complete =
+            vectors.into_iter().chain(field.map(|field| field.values)).all(|numbers| numbers.len() >= points);
         let is_usable = options.spacing > 0.0 && options.spacing.is_finite();
         if !(is_complete && is_usable) {
             return 0;

@@ -132,11 +132,8 @@ impl LabelParts {
     /// # Panics
     /// If the surface names vertices, or the places points, that are not there.
     pub fn of(surface: &Triangles<'_>, places: &[EdgePlace], labels: &[f64]) -> Self {
-        let shares: Vec<Shares> = surface
-            .indices
-            .iter()
-            .map(|triangle| Shares::of(triangle.map(|v| places[v as usize])))
-            .collect();
+        let shares: Vec<Shares> =
+            surface.indices.iter().map(|triangle| Shares::of(triangle.map(|v| places[v as usize]))).collect();
         let label = |shares: &Shares, i: usize| labels[shares.points[i] as usize];
         let is_cut = |shares: &Shares| (1..shares.count).any(|i| label(shares, i) != label(shares, 0));
         let cut: Vec<bool> = shares.iter().map(is_cut).collect();
@@ -168,7 +165,8 @@ impl LabelParts {
                 continue;
             }
             let corners = [0, 1, 2].map(|k| {
-                let known = vertex_of[triangle[k] as usize].filter(|&v| parts.labels[v as usize] == label(shares, 0));
+                let known =
+                    vertex_of[triangle[k] as usize].filter(|&v| parts.labels[v as usize] == label(shares, 0));
                 known.unwrap_or_else(|| parts.vertex(&part, CORNERS[k], label(shares, 0)))
             });
             (0..3).for_each(|k| vertex_of[triangle[k] as usize] = Some(corners[k]));
@@ -208,7 +206,8 @@ impl LabelParts {
                 }
             }
             if area(&polygon) > ROUNDING {
-                let vertices: Vec<u32> = polygon.iter().map(|(at, _)| self.vertex(of, *at, label(i))).collect();
+                let vertices: Vec<u32> =
+                    polygon.iter().map(|(at, _)| self.vertex(of, *at, label(i))).collect();
                 for k in 1..vertices.len() - 1 {
                     let mut inner = 0;
                     for (bit, from, is_side) in
@@ -268,8 +267,7 @@ impl LabelParts {
         }
         if !surface.slopes.is_empty() {
             let [a, b, c] = corners.map(|v| surface.slopes[v as usize]);
-            let mixed =
-                |i: usize, k: usize| at[0] * a[i][k] + at[1] * b[i][k] + at[2] * c[i][k];
+            let mixed = |i: usize, k: usize| at[0] * a[i][k] + at[1] * b[i][k] + at[2] * c[i][k];
             self.slopes.push([0, 1, 2].map(|i| [0, 1, 2].map(|k| mixed(i, k))));
         }
         v
@@ -310,13 +308,19 @@ mod tests {
         let surface = Triangles { positions: &positions, indices: &[[0, 1, 2]], ..Triangles::default() };
         let parts = LabelParts::of(&surface, &corner_places(), &[7.0, -2.0, 7.0]);
         assert!((size(&parts, 7.0) - 4.0).abs() < 1e-12 && (size(&parts, -2.0) - 2.0).abs() < 1e-12);
-        assert!(parts.indices.iter().all(|t| t.iter().all(|v| parts.labels[*v as usize] == parts.labels[t[0] as usize])));
+        assert!(
+            parts
+                .indices
+                .iter()
+                .all(|t| t.iter().all(|v| parts.labels[*v as usize] == parts.labels[t[0] as usize]))
+        );
         // Each half of each side is an edge once, and nothing else is.
         let is_edge = |(triangle, inner): (&[u32; 3], &u8)| {
             let ends = (0..3).filter(|k| inner >> k & 1 == 0).map(|k| [triangle[k], triangle[(k + 1) % 3]]);
             ends.map(|end| end.map(|v| parts.positions[v as usize])).collect::<Vec<_>>()
         };
-        let edges: Vec<[[f64; 3]; 2]> = parts.indices.iter().zip(&parts.inner_sides).flat_map(is_edge).collect();
+        let edges: Vec<[[f64; 3]; 2]> =
+            parts.indices.iter().zip(&parts.inner_sides).flat_map(is_edge).collect();
         let length: f64 = edges.iter().map(|[a, b]| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
         assert_eq!(edges.len(), 6);
         assert!((length - 12.0).abs() < 1e-12);
@@ -340,9 +344,12 @@ mod tests {
             .flat_map(|t| [0, 1, 2].map(|k| [places(t[k]), places(t[(k + 1) % 3])]))
             .collect();
         let alone = sides.iter().filter(|[a, b]| !sides.contains(&[*b, *a]));
-        let is_outside = |[a, b]: &&[[i64; 3]; 2]| (0..2).any(|axis| a[axis] == b[axis] && a[axis] % 1_000_000_000 == 0);
+        let is_outside =
+            |[a, b]: &&[[i64; 3]; 2]| (0..2).any(|axis| a[axis] == b[axis] && a[axis] % 1_000_000_000 == 0);
         assert!(alone.clone().all(|side| is_outside(&side)), "{:?}", alone.collect::<Vec<_>>());
-        assert!((size(&parts, 1.0) - 1.0 / 6.0).abs() < 1e-12 && (size(&parts, 5.0) - 5.0 / 6.0).abs() < 1e-12);
+        assert!(
+            (size(&parts, 1.0) - 1.0 / 6.0).abs() < 1e-12 && (size(&parts, 5.0) - 5.0 / 6.0).abs() < 1e-12
+        );
     }
 
     #[test]

@@ -48,7 +48,10 @@ mod tests {
             let value = label_value(f64::from(i) - 7.0, -7.0);
             let colour = region_color(i % REGION_COLORS).map(|c| f32::from(c) / 255.0);
             let found = region_scale().colour(value);
-            assert!(found.iter().zip(colour).all(|(a, b)| (a - b).abs() < 1e-3), "{i}: {found:?}, {colour:?}");
+            assert!(
+                found.iter().zip(colour).all(|(a, b)| (a - b).abs() < 1e-3),
+                "{i}: {found:?}, {colour:?}"
+            );
         }
     }
 }

@@ -10,8 +10,8 @@
 //! - Same mesh, same bytes; and how pieces are cut depends on the places of points, not on their numbers, which another way to the same mesh
 //!   gives otherwise.
 
-use super::{FieldView, MeshView};
 use super::marching::{Crossing, Crossings, Polygon};
+use super::{FieldView, MeshView};
 use crate::mesh::{FACES, NONE};
 use std::cmp::Ordering;
 

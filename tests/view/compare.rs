@@ -109,8 +109,13 @@ fn the_difference_has_symmetric_colours() {
         (before.positions.to_vec(), before.tets.to_vec(), before.neighbors.to_vec());
     refined(&mut session, 0.0);
     assert!(picture(&mut scene, &mut session) != same);
-    let other =
-        tetralod::view::MeshView { positions: &positions, field: &kept, is_label: false, tets: &tets, neighbors: &neighbors };
+    let other = tetralod::view::MeshView {
+        positions: &positions,
+        field: &kept,
+        is_label: false,
+        tets: &tets,
+        neighbors: &neighbors,
+    };
     let expected = Difference::of(&session.view(), other).expect("a mesh").largest;
     let range = scene.legend().expect("colours").scale.range;
     assert!(expected > 0.0 && range == [-expected, expected], "{range:?} for {expected}");

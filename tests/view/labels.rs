@@ -105,7 +105,9 @@ fn each_part_of_a_surface_has_the_label_of_the_nearest_corner() {
     let values: Vec<f64> = mesh.positions.iter().map(|p| hilly(*p)).collect();
     let other = MeshView { field: &values, is_label: false, ..view };
     let mut surface = IsoSurface::new();
-    let middle = 0.5 * (values.iter().fold(f64::INFINITY, |m, x| m.min(*x)) + values.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)));
+    let middle = 0.5
+        * (values.iter().fold(f64::INFINITY, |m, x| m.min(*x))
+            + values.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)));
     surface.extract(&other, middle);
     assert!(!surface.indices.is_empty());
     check(&view, &(&surface).into(), &surface.edge_places(&other), &mut random);
@@ -180,7 +182,8 @@ fn labels_have_the_colours_of_the_palette_and_no_gradient() {
     drop(edits);
     assert_eq!(tets, session.view().tets.len());
     let legend = scene.legend().expect("colours");
-    let expected: Vec<_> = [(5.0, 0), (7.0, 2), (9.0, 4), (11.0, 6)].map(|(label, place)| (label, region_color(place))).into();
+    let expected: Vec<_> =
+        [(5.0, 0), (7.0, 2), (9.0, 4), (11.0, 6)].map(|(label, place)| (label, region_color(place))).into();
     assert_eq!((legend.label.as_str(), &legend.labels), ("cluster", &expected));
 }
 
@@ -197,7 +200,10 @@ fn what_has_no_values_between_is_refused() {
     for (what, state) in [
         ("isosurfaces", SceneState { isosurfaces: vec![isosurface(None)], ..none() }),
         ("volume", SceneState { volume: Some(VolumeState::default()), ..none() }),
-        ("compare.difference", SceneState { compare: Some(CompareState { at: 0.0, difference: true }), ..none() }),
+        (
+            "compare.difference",
+            SceneState { compare: Some(CompareState { at: 0.0, difference: true }), ..none() },
+        ),
         ("streamlines.field", SceneState { streamlines: Some(lines), ..none() }),
         ("arrows.field", SceneState { arrows: Some(arrows), ..none() }),
         ("threshold.cut", SceneState { threshold: Some(threshold.clone()), ..none() }),
@@ -210,7 +216,10 @@ fn what_has_no_values_between_is_refused() {
         assert!(found == what && problem.contains("'cluster' is a label"), "{found}: {problem}");
     }
     let refused = session.isosurface(7.0).map(|_| "made").expect_err("of a label");
-    assert!(matches!(&refused, SessionError::Label { name } if name == "cluster") && refused.code() == "bad-option");
+    assert!(
+        matches!(&refused, SessionError::Label { name } if name == "cluster")
+            && refused.code() == "bad-option"
+    );
     assert_eq!(session.surface_first(2), Some(false));
     // Whole tetrahedra of some labels are shown, and a label colours the isosurface of another field.
     let mut scene = Scene::default();
@@ -220,7 +229,9 @@ fn what_has_no_values_between_is_refused() {
     scene.update(&mut session).changed.expect("whole ones");
     let view = session.view();
     let shown = view.tets.iter().filter(|tet| tet[0] != tetralod::mesh::NONE).flatten();
-    assert!(shown.clone().count() > 0 && shown.clone().all(|&v| [5.0, 7.0].contains(&view.field[v as usize])));
+    assert!(
+        shown.clone().count() > 0 && shown.clone().all(|&v| [5.0, 7.0].contains(&view.field[v as usize]))
+    );
     session.set_field(0).expect("it is there");
     let mut scene = Scene::default();
     scene.set_state(SceneState { isosurfaces: vec![isosurface(cluster())], ..none() }).expect("a good state");
@@ -228,7 +239,8 @@ fn what_has_no_values_between_is_refused() {
     changed.expect("coloured by a label");
     let coloured = edits.iter().any(|edit| match edit {
         Edit::Surface { triangles, .. } => {
-            triangles.normals.len() == triangles.positions.len() && triangles.values.iter().any(|value| *value != triangles.values[0])
+            triangles.normals.len() == triangles.positions.len()
+                && triangles.values.iter().any(|value| *value != triangles.values[0])
         }
         _ => false,
     });

@@ -190,7 +190,8 @@ impl BuildOptions {
 
     /// Which fields are labels, and which are not, as far as that is said.
     pub(super) fn labels(&self) -> Vec<(String, bool)> {
-        let named = |names: &[String], is_label| names.iter().map(move |name| (name.clone(), is_label)).collect();
+        let named =
+            |names: &[String], is_label| names.iter().map(move |name| (name.clone(), is_label)).collect();
         let both: [Vec<(String, bool)>; 2] = [named(&self.labels, true), named(&self.no_labels, false)];
         if let Some((name, _)) = both[0].iter().find(|(name, _)| self.no_labels.contains(name)) {
             refuse_usage(&format!("'{name}' is a label or not: give --label or --no-label for it"));

@@ -8,8 +8,8 @@ use crate::repair::Repair;
 use crate::{files, input};
 use anyhow::{Result, anyhow};
 use tetralod::mesh::{GeometryField, RepairLevel, RepairReport, TetMesh};
-use tetralod_build::{BuildConfig, mark_labels};
 use tetralod_build::parts::PartsError;
+use tetralod_build::{BuildConfig, mark_labels};
 use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
 
 impl BuildOptions {

@@ -157,15 +157,6 @@ pub fn two_steps(name: &str) -> (Folder, String) {
     (folder, mt)
 }
 
-/// The names of a table's columns, and its rows.
-fn table(path: &str) -> (Vec<String>, Vec<Vec<f64>>) {
-    let text = fs::read_to_string(path).expect("a table");
-    let mut lines = text.lines();
-    let names = lines.next().expect("a head").split(',').map(str::to_owned).collect();
-    let row = |line: &str| line.split(',').map(|value| value.parse().expect("a number")).collect();
-    (names, lines.map(row).collect())
-}
-
 #[test]
 fn a_time_says_which_step_is_meant() {
     let (folder, mt) = two_steps("a-time");
@@ -473,7 +464,7 @@ fn labels_stay_labels_in_all_that_is_made_of_them() {
     }
     let vtu = format!("{out}.vtu");
     good(&["extract", &mt, "-o", &vtu]);
-    let extracted = io::read(folder.path("out.vtu")).expect("a mesh");
+    let extracted = io::read(vtu.as_ref()).expect("a mesh");
     let material = extracted.fields.iter().find(|field| field.name == "material").expect("a field");
     assert!(material.integer && known(&material.values));
     bad(1, &["isosurface", &mt, "--field", "material", "--iso", "1", "-o", &vtu], &["'material' is a label"]);

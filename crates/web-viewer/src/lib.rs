@@ -417,8 +417,9 @@ impl Viewer {
             (Some((least, _)), Some((most, _))) => [*least, *most],
             _ => scale.range,
         };
-        let labels =
-            labels.iter().map(|(value, colour)| object(&[("value", (*value).into()), ("colour", css(*colour))]));
+        let labels = labels
+            .iter()
+            .map(|(value, colour)| object(&[("value", (*value).into()), ("colour", css(*colour))]));
         Some(object(&[
             ("label", label.as_str().into()),
             ("range", list(&range)),

@@ -77,7 +77,8 @@ pub fn boundary(mesh: &MeshView<'_>, fields: impl Iterator<Item = Vec<f64>>, sto
 
 /// A field of a session, whose values are these.
 pub fn view<'a>(session: &Session, field: usize, values: &'a [f64]) -> FieldView<'a> {
-    let is_label = session.info().is_some_and(|info| info.fields.get(field).is_some_and(|field| field.is_label));
+    let is_label =
+        session.info().is_some_and(|info| info.fields.get(field).is_some_and(|field| field.is_label));
     FieldView { values, is_label }
 }
 

@@ -11,8 +11,8 @@ use tetralod::refine::Request;
 use tetralod::session::Session;
 use tetralod_build::verify::{Reference, Sample};
 use tetralod_build::{
-    BuildConfig, BuildCriterion, BuildError, BuildResult, Construction, FieldPrecision, Method, Remedy, build,
-    mark_labels,
+    BuildConfig, BuildCriterion, BuildError, BuildResult, Construction, FieldPrecision, Method, Remedy,
+    build, mark_labels,
 };
 
 /// Every kind with every way to build it.

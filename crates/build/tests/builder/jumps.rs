@@ -381,7 +381,7 @@ fn constants_of_materials_lose_nothing_and_have_no_surface_between_them() {
     // Compared with each other, too, meshes have the values of the same region at each point.
     let mut kept = |error: f64| {
         session.refine(&Request::within(error)).expect("a valid MT");
-        let MeshView { positions, field, tets, neighbors } = session.view();
+        let MeshView { positions, field, tets, neighbors, .. } = session.view();
         (positions.to_vec(), field.to_vec(), tets.to_vec(), neighbors.to_vec())
     };
     let meshes = [kept(0.5), kept(0.0)];
@@ -390,6 +390,7 @@ fn constants_of_materials_lose_nothing_and_have_no_surface_between_them() {
         field,
         tets,
         neighbors,
+        is_label: false,
     });
     for (a, b) in [(coarse, fine), (fine, coarse)] {
         let difference = Difference::of(&a, b).expect("there are tetrahedra");

@@ -561,7 +561,13 @@ mod tests {
     const AROUND: [[u32; 4]; 1] = [[tetralod::mesh::NONE; 4]];
 
     fn mesh() -> Edit<'static> {
-        let mesh = MeshView { positions: &PLACES, field: &[0.0; 4], is_label: false, tets: &TETS, neighbors: &AROUND };
+        let mesh = MeshView {
+            positions: &PLACES,
+            field: &[0.0; 4],
+            is_label: false,
+            tets: &TETS,
+            neighbors: &AROUND,
+        };
         Edit::Mesh(mesh, [&[], &[]])
     }
 

@@ -84,7 +84,13 @@ impl Current {
             None => [mesh.tets, mesh.neighbors],
         };
         Input {
-            mesh: MeshView { field: coloured, is_label: mesh.is_label && difference.is_none(), tets, neighbors, ..mesh },
+            mesh: MeshView {
+                field: coloured,
+                is_label: mesh.is_label && difference.is_none(),
+                tets,
+                neighbors,
+                ..mesh
+            },
             field: mesh.field,
             largest_difference: difference.map(|difference| difference.largest),
             apart: self.compared.as_ref().map_or(0, |(apart, _)| *apart),

@@ -36,7 +36,9 @@ pub(super) fn of_tets(input: &Input<'_>, field: usize) -> Vec<f64> {
 fn most_frequent(mut all: [f64; 4]) -> f64 {
     all.sort_by(f64::total_cmp);
     let count = |x: f64| all.iter().filter(|other| **other == x).count();
-    all.into_iter().reduce(|best, next| if count(next) > count(best) { next } else { best }).unwrap_or_default()
+    all.into_iter()
+        .reduce(|best, next| if count(next) > count(best) { next } else { best })
+        .unwrap_or_default()
 }
 
 /// The labels that the mesh has, ascending, with their colours in sRGB.
@@ -72,7 +74,11 @@ pub(super) fn check(input: &Input<'_>) -> Result<()> {
             return refuse("volume", &field.name, &between);
         }
         if state.compare.is_some_and(|compare| compare.difference) {
-            return refuse("compare.difference", &field.name, "labels have no difference; compare side by side");
+            return refuse(
+                "compare.difference",
+                &field.name,
+                "labels have no difference; compare side by side",
+            );
         }
     }
     let along = [
@@ -80,7 +86,9 @@ pub(super) fn check(input: &Input<'_>) -> Result<()> {
         ("arrows.field", state.arrows.as_ref().and_then(|arrows| arrows.field.as_ref())),
     ];
     for (what, name) in along {
-        let Some(field) = name.map(|name| input.field(what, Some(name))).transpose()?.and_then(label) else { continue };
+        let Some(field) = name.map(|name| input.field(what, Some(name))).transpose()?.and_then(label) else {
+            continue;
+        };
         return refuse(what, &field.name, "colour by a field that has values between");
     }
     Ok(())

@@ -208,7 +208,8 @@ impl Scene {
         let field = input::field_number(info, session.field(), "threshold.field", threshold.field.as_ref())?;
         let (name, is_label) = (&info.fields[field].name, info.fields[field].is_label);
         if threshold.cut && is_label {
-            let problem = format!("'{name}' is a label: nothing can be cut between two labels; leave `cut` out");
+            let problem =
+                format!("'{name}' is a label: nothing can be cut between two labels; leave `cut` out");
             return Err(SceneError::state("threshold.cut", problem));
         }
         Ok(Some(Within { field, range: threshold.range, is_cut: threshold.cut }))

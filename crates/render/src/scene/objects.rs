@@ -15,8 +15,9 @@ use tetralod::mesh::NONE;
 use tetralod::mt::MeshChanges;
 use tetralod::session::TetQuantity;
 use tetralod::view::{
-    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, FieldView, IsoSurface, LabelParts, MeshView, Slice, Slope, Solids,
-    SurfaceChanges, TraceOptions, Tracer, Triangles, TubeOptions, region_color, region_scale,
+    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, FieldView, IsoSurface, LabelParts, MeshView,
+    Slice, Slope, Solids, SurfaceChanges, TraceOptions, Tracer, Triangles, TubeOptions, region_color,
+    region_scale,
 };
 
 /// Numbers of surfaces: those of lists begin at these.
@@ -254,8 +255,8 @@ impl Isosurface {
             (moves, slopes.map(|slope| by.scaled(slope)).collect())
         });
         self.is_whole = coloured.is_none() && by.is_none();
-        let parts =
-            label.map(|field| labels::parts(&self.triangles(), &self.surface.edge_places(&mesh), input, field));
+        let parts = label
+            .map(|field| labels::parts(&self.triangles(), &self.surface.edge_places(&mesh), input, field));
         self.parts = parts.unwrap_or_default();
         let own: &'a Self = self;
         let single = coloured.map_or(SingleValues::PLAIN, |field| input.single(field));
