@@ -121,7 +121,10 @@ test("labels at cells stay labels: the boundary in their colours, and nothing be
   const dialog = page.locator("dialog.build");
   await dialog.getByRole("button", { name: "Build" }).click();
   await page.waitForFunction(() => window.tetralodDemo.info?.tetrahedra === 1296 && window.tetralodDemo.state === "complete", undefined, { timeout: PATIENCE });
-  assert.match(await dialog.getByText("is averaged from cells").innerText(), /^material is averaged from cells: .*; another label in [\d.]+ % of a cell at most/);
+  assert.match(
+    await dialog.getByText("is averaged from cells").innerText(),
+    /^material is averaged from cells: .*; another label in [\d.]+ % of a cell at most/,
+  );
   await dialog.getByRole("button", { name: "Close" }).click();
   const { isLabel, name } = await page.evaluate(() => window.tetralodDemo.info.fields[0]);
   assert.deepEqual([isLabel, name], [true, "material"]);
