@@ -4,8 +4,8 @@
 //! that is not convex need not mean that the point is outside, all tetrahedra are searched or, when that happens more
 //! often, a grid of boxes over the mesh. All decisions are exact (Shewchuk 1997) for the coordinates given.
 //!
-//! What holds: a point of the domain, its boundary included, is found; of several tetrahedra that meet at a point the one with the smallest
-//! number is taken. Points that are computed to be on a face of the boundary are beside it by what rounding does: one that is outside by no more
+//! What holds: a point of the domain, its boundary included, is found; of several tetrahedra that meet at a point the one whose corners come
+//! first by their coordinates is taken: numbers would depend on what a mesh has been before. Points that are computed to be on a face of the boundary are beside it by what rounding does: one that is outside by no more
 //! than [`ROUNDING`] is found in the nearest tetrahedron, at its border. What is further outside is not found.
 
 use crate::geom::{Bounds, Groups};
@@ -13,6 +13,7 @@ use crate::mesh::{FACES, NONE};
 use crate::view::{FieldView, MeshView};
 use glam::DVec3;
 use robust::Coord3D;
+use std::cmp::Ordering;
 
 /// Pieces of a line that are shorter than this fraction of it are left out, and gaps are closed: rounding makes them
 /// where a line passes through points and edges of the mesh.
@@ -157,13 +158,13 @@ impl<'a> Probe<'a> {
 
     fn find(&mut self, p: [f64; 3]) -> Option<u32> {
         if let Some(tet) = self.walk(self.last, p, NEAR_STEPS) {
-            return Some(self.smallest(tet, p));
+            return Some(self.first_at(tet, p));
         }
         if let Some(grid) = &self.grid {
-            return self.first_of(grid.at(p), p).map(|tet| self.smallest(tet, p));
+            return self.first_of(grid.at(p), p).map(|tet| self.first_at(tet, p));
         }
         if let Some(tet) = self.start(p).and_then(|start| self.walk(start, p, MOST_STEPS)) {
-            return Some(self.smallest(tet, p));
+            return Some(self.first_at(tet, p));
         }
         self.scans += 1;
         if self.scans > MOST_SCANS {
@@ -171,10 +172,10 @@ impl<'a> Probe<'a> {
         }
         let near = NearLine::new(&self.mesh, p, p);
         let mut candidates = (0..self.mesh.tets.len() as u32).filter(|&t| near.meets(&self.mesh, t));
-        candidates.find(|&t| self.holds(t, p)).map(|tet| self.smallest(tet, p))
+        candidates.find(|&t| self.holds(t, p)).map(|tet| self.first_at(tet, p))
     }
 
-    /// The nearest tetrahedron to a point that is outside by what rounding does; of several the one with the smallest number.
+    /// The nearest tetrahedron to a point that is outside by what rounding does; of several the first by its corners.
     fn find_beside(&self, p: [f64; 3]) -> Option<u32> {
         let largest =
             |bounds: &Bounds| bounds.min.into_iter().chain(bounds.max).fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -190,7 +191,11 @@ impl<'a> Probe<'a> {
         let mut best: Option<(f64, u32)> = None;
         let mut see = |t: u32| {
             let beside = self.beside(t, p, [low, high]).filter(|beside| *beside <= reach);
-            if let Some(beside) = beside.filter(|beside| best.is_none_or(|(least, _)| *beside < least)) {
+            let is_nearer = |beside: f64| match best {
+                None => true,
+                Some((least, of)) => beside.total_cmp(&least).then_with(|| self.by_corners(t, of)).is_lt(),
+            };
+            if let Some(beside) = beside.filter(|beside| is_nearer(*beside)) {
                 best = Some((beside, t));
             }
         };
@@ -248,7 +253,9 @@ impl<'a> Probe<'a> {
                 (0..self.mesh.tets.len() as u32).filter(|&t| near.meets(&self.mesh, t)).for_each(&mut clip);
             }
         }
-        sort_parts(&mut parts);
+        parts.sort_unstable_by(|a, b| {
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then_with(|| self.by_corners(a.2, b.2))
+        });
         let mut spans: Vec<Span> = Vec::new();
         for (enter, leave, t) in parts {
             let done = spans.last().map_or(f64::NEG_INFINITY, |span| span.to);
@@ -315,8 +322,8 @@ impl<'a> Probe<'a> {
         None
     }
 
-    /// The smallest of the tetrahedra that contain the point and are connected there.
-    fn smallest(&self, tet: u32, p: [f64; 3]) -> u32 {
+    /// Of the tetrahedra that contain the point and are connected there the first by their corners.
+    fn first_at(&self, tet: u32, p: [f64; 3]) -> u32 {
         let mut found = vec![tet];
         let mut next = 0;
         while let Some(&t) = found.get(next) {
@@ -329,7 +336,18 @@ impl<'a> Probe<'a> {
                 }
             }
         }
-        found.into_iter().min().unwrap_or(tet)
+        found.into_iter().min_by(|a, b| self.by_corners(*a, *b)).unwrap_or(tet)
+    }
+
+    /// The order of two tetrahedra by the coordinates of their corners, the lowest corners first.
+    fn by_corners(&self, a: u32, b: u32) -> Ordering {
+        let [a, b] = [a, b].map(|t| {
+            let mut corners = self.mesh.tets[t as usize].map(|v| self.mesh.positions[v as usize]);
+            corners.sort_unstable_by(by_coordinates);
+            corners
+        });
+        let differs = a.iter().zip(&b).map(|(p, q)| by_coordinates(p, q));
+        differs.fold(Ordering::Equal, Ordering::then)
     }
 
     /// On which side of each face a point is: positive outside, with the exact sign; none for a tetrahedron that
@@ -366,9 +384,8 @@ impl<'a> Probe<'a> {
     }
 }
 
-/// Sorts the parts of a segment, each from where to where in which tetrahedron, by these.
-fn sort_parts(parts: &mut [(f64, f64, u32)]) {
-    parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+fn by_coordinates(p: &[f64; 3], q: &[f64; 3]) -> Ordering {
+    p.iter().zip(q).map(|(x, y)| x.total_cmp(y)).fold(Ordering::Equal, Ordering::then)
 }
 
 /// Six times the volume of a tetrahedron, with the exact sign.

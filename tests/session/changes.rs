@@ -88,7 +88,10 @@ fn assert_cut(session: &mut Session, Within { field, range, .. }: Within) {
         assert!(found.iter().zip(values).all(|(a, b)| (a - b).abs() < 1e-12) && found.len() == values.len());
     }
     for quantity in [TetQuantity::Size, TetQuantity::Depth] {
-        assert_eq!(session.tet_quantity(quantity).expect("it is open").len(), expected.view(&[][..]).tets.len());
+        assert_eq!(
+            session.tet_quantity(quantity).expect("it is open").len(),
+            expected.view(&[][..]).tets.len()
+        );
     }
     let (own, shown) = (session.values(session.field()), session.view());
     let expected = expected.view(&own);

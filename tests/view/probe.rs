@@ -116,6 +116,41 @@ fn points_are_found_inside_and_not_outside() {
 }
 
 #[test]
+fn where_tetrahedra_meet_the_same_one_is_found_whatever_their_numbers_are() {
+    let mesh = bent(4);
+    let mut backwards = mesh.clone();
+    backwards.tets.reverse();
+    let scenes = [mesh, backwards].map(|mesh| scene(&mesh));
+    let mut random = Random::new(11);
+    for _ in 0..400 {
+        let of = scenes[0].view().tets[random.below(scenes[0].view().tets.len())];
+        let corners = of.map(|v| scenes[0].view().positions[v as usize]);
+        // A corner, and the middles of an edge and of two such points.
+        let middle = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));
+        for p in
+            [corners[0], middle(corners[0], corners[1]), middle(middle(corners[0], corners[1]), corners[2])]
+        {
+            let found = scenes.each_ref().map(|scene| {
+                let view = scene.view();
+                // From anywhere, with the grid and without.
+                let mut probe = Probe::new(view);
+                if random.fraction() < 0.5 {
+                    probe.make_grid();
+                }
+                probe.locate(random_point(&mut random));
+                view.tets[probe.locate(p).expect("it is in the mesh").tet as usize]
+            });
+            assert_eq!(found[0], found[1]);
+            let line = |i: usize| Probe::new(scenes[i].view()).line(corners[0], corners[3]);
+            let tets = [0, 1].map(|i| -> Vec<_> {
+                line(i).iter().map(|span| scenes[i].view().tets[span.entry.tet as usize]).collect()
+            });
+            assert_eq!(tets[0], tets[1]);
+        }
+    }
+}
+
+#[test]
 fn points_are_found_in_every_current_mesh() {
     for kind in KINDS {
         let mut walk = Walk::new(&cube(7, &[hilly]), kind);

@@ -1,7 +1,6 @@
 //! Updates that are about to be appended to a half-edge MT. First they are applied, one after the other, and their stars are taken down;
 //! then the stars are coded, each by itself.
 
-use super::builder::NextUpdate;
 use super::forest::Forest;
 use super::new_star::{NEW, NewTet};
 use super::places::Places;
@@ -22,6 +21,19 @@ use std::ops::Range;
 
 /// So many stars are coded at a time: a thread takes no fewer.
 const SHARE: usize = 32;
+
+/// The next update.
+#[doc(hidden)]
+pub struct NextUpdate<'a> {
+    /// The levels of the new vertex.
+    pub levels: &'a [i32],
+    /// Where fields jump, its levels in single regions; in others it has those above.
+    pub sides: &'a [(u16, &'a [i32])],
+    pub errors: &'a [ErrorCode],
+    /// The faces opposite the new vertex of the tetrahedra that it is to insert, each one and all of them in ascending order of names;
+    /// empty if they are those that it does insert.
+    pub faces: &'a [[u32; 3]],
+}
 
 /// Consecutive updates.
 #[derive(Default)]

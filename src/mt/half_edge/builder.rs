@@ -4,6 +4,7 @@
 //! are some. Batches do not depend on how many there are.
 
 use super::batch::Batch;
+pub use super::batch::NextUpdate;
 #[doc(hidden)]
 pub use super::forest::Forest;
 use super::refusal::{damaged, refused};
@@ -13,26 +14,13 @@ use super::store::{BaseMark, ForestChild, HalfEdgeMt};
 use crate::mt::facts::{MtFacts, level_volumes};
 use crate::mt::reaches::Reaches;
 use crate::mt::{
-    ApplyUpdates, BaseMesh, ConvertError, CurrentMesh, ErrorCode, Margins, MtInfo, MultiTessellation,
-    Regions, UpdateError,
+    ApplyUpdates, BaseMesh, ConvertError, CurrentMesh, Margins, MtInfo, MultiTessellation, Regions,
+    UpdateError,
 };
 use crate::threads;
 
 /// Updates of a batch.
 const BATCH: usize = 1024;
-
-/// The next update.
-#[doc(hidden)]
-pub struct NextUpdate<'a> {
-    /// The levels of the new vertex.
-    pub levels: &'a [i32],
-    /// Where fields jump, its levels in single regions; in others it has those above.
-    pub sides: &'a [(u16, &'a [i32])],
-    pub errors: &'a [ErrorCode],
-    /// The faces opposite the new vertex of the tetrahedra that it is to insert, each one and all of them in ascending order of names;
-    /// empty if they are those that it does insert.
-    pub faces: &'a [[u32; 3]],
-}
 
 /// A half-edge MT that grows.
 #[doc(hidden)]

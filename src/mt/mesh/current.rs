@@ -10,7 +10,7 @@
 
 use super::base::{BaseMesh, BaseMeshError};
 use super::paged_array::PagedArray;
-use super::sides::Sides;
+use super::side_slots::SideSlots;
 use super::tet::face_neighbors;
 use crate::mesh::{BitSet, ChangedBlocks, FACES, NONE};
 use crate::mt::{MtInfo, VertexId};
@@ -109,7 +109,7 @@ pub struct CurrentMesh {
     /// The region of each tetrahedron, kept in free slots, too; empty if the MT has no regions.
     pub(in crate::mt) regions: Vec<u16>,
     /// Where fields jump at interfaces.
-    pub(super) sides: Option<Box<Sides>>,
+    pub(super) sides: Option<Box<SideSlots>>,
     /// Whether every vertex that is not of the base mesh has a star whose tetrahedra hang together through faces.
     pub(in crate::mt) whole_stars: bool,
     /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.

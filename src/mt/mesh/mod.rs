@@ -4,6 +4,7 @@ pub(super) mod base;
 pub(super) mod current;
 pub(super) mod limits;
 pub(super) mod paged_array;
+mod side_slots;
 mod sides;
 pub(super) mod stars;
 mod tags;

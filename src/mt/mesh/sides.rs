@@ -12,38 +12,14 @@
 //! ```
 
 use super::current::{CurrentMesh, KindWord, Labels};
+use super::side_slots::SideSlots;
 use crate::mesh::NONE;
-
-/// The sides of the vertices of a mesh.
-#[derive(Clone, Debug)]
-pub(in crate::mt) struct Sides {
-    /// For each field whether its values depend on the region.
-    pub jumps: Vec<bool>,
-    /// For each slot the next side of the same vertex; [`NONE`] behind the last.
-    next: Vec<u32>,
-    /// The tetrahedra with sides as corners, as of the last call of [`CurrentMesh::compact`] or [`CurrentMesh::take_changes`].
-    pub(super) corners: Vec<[u32; 4]>,
-}
-
-impl Sides {
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&self.next[..]) + size_of_val(&self.corners[..])
-    }
-
-    pub(super) fn push(&mut self) {
-        self.next.push(NONE);
-    }
-
-    pub(super) fn pop(&mut self) {
-        self.next.pop();
-    }
-}
 
 impl CurrentMesh {
     /// From now on vertices may have sides, in these fields.
     pub(in crate::mt) fn keep_sides(&mut self, jumps: Vec<bool>) {
         let next = vec![NONE; self.labels.len()];
-        self.sides = Some(Box::new(Sides { jumps, next, corners: Vec::new() }));
+        self.sides = Some(Box::new(SideSlots { jumps, next, corners: Vec::new() }));
     }
 
     /// For each field whether its values depend on the region; none if no vertex has sides.

@@ -4,6 +4,7 @@ use crate::change::collapse_check::Refusal;
 use crate::change::sides::{FaceSet, Sides, bits, rank};
 use crate::change::work_mesh::{ELSEWHERE, StarTet, WorkMesh};
 use crate::geometry::flat::{Feature, Planes};
+use crate::lattice::quantize::Quantized;
 use tetralod::geom::orient3d;
 use tetralod::mesh::{FACES, NONE};
 use tetralod::mt::MAX_LINK;
@@ -313,6 +314,18 @@ impl Hole {
     #[inline]
     pub fn left_at(&self, i: usize) -> u32 {
         self.others(i).count_ones()
+    }
+
+    /// [`Quantized::overshoot`] for the vertex, given the region of each tetrahedron around it if fields jump.
+    pub fn overshoot(&self, quantized: &Quantized, regions: &[u32], f: usize) -> f64 {
+        let sides = &quantized.sides;
+        if sides.is_empty() {
+            return quantized.overshoot(&[self.a], &self.link, f);
+        }
+        let own: Vec<u32> = regions.iter().map(|&region| sides.point(self.a, region)).collect();
+        let around = self.faces.iter().zip(regions);
+        let around = around.flat_map(|((face, _), &region)| face.map(|v| sides.point(v, region)));
+        quantized.overshoot(&own, &around.collect::<Vec<u32>>(), f)
     }
 
     /// Whether the vertex is on the boundary.

@@ -189,7 +189,7 @@ impl Collapses {
             let of = |&maker: &u32| self.errors[maker as usize * self.fields + f];
             let made = self.makers[first..].iter().filter(|&&maker| maker != NONE);
             let least = made.map(of).max().map_or(own, |largest| {
-                let more = quantized.overshoot_of(hole, regions, f).max(step);
+                let more = hole.overshoot(quantized, regions, f).max(step);
                 ErrorCode::at_least(largest.error() + more).coarse()
             });
             self.errors.push(own.max(least));

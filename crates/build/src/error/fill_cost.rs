@@ -119,7 +119,7 @@ impl Removals {
         }
         errors.clone_from(inherited);
         if *depends {
-            let overshoot = |f: usize| reference.quantized.overshoot_of(hole, regions, f);
+            let overshoot = |f: usize| hole.overshoot(reference.quantized, regions, f);
             errors.iter_mut().enumerate().for_each(|(f, error)| *error += overshoot(f));
         }
     }

@@ -1,6 +1,5 @@
 //! The input on integer lattices: positions and field levels.
 
-use crate::change::hole::Hole;
 use crate::error::points::{as_vec, clamped};
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
@@ -10,7 +9,7 @@ use crate::lattice::places::Places;
 use crate::lattice::position_lattice;
 use crate::lattice::position_lattice::Placed;
 use crate::lattice::sides::{self, Sides};
-use crate::restrict::preserve;
+use crate::restrict::region_labels;
 use crate::{BuildConfig, BuildError};
 use glam::DVec3;
 use std::sync::Arc;
@@ -119,6 +118,12 @@ impl Quantized {
                 &mut losses,
             );
         }
+        // A label is not interpolated: each of the input's points is still nearest to its own vertex.
+        losses
+            .iter_mut()
+            .zip(&self.fields)
+            .filter(|(_, field)| field.is_label)
+            .for_each(|(loss, _)| *loss = 0.0);
         losses
     }
 
@@ -141,18 +146,6 @@ impl Quantized {
     /// The vertex that a point is one of.
     pub fn vertex(&self, point: u32) -> u32 {
         self.places.vertex(point)
-    }
-
-    /// [`Quantized::overshoot`] for the vertex of a hole whose tetrahedra are in these regions, if fields jump.
-    pub fn overshoot_of(&self, hole: &Hole, regions: &[u32], f: usize) -> f64 {
-        if self.sides.is_empty() {
-            return self.overshoot(&[hole.a], &hole.link, f);
-        }
-        let at = |v: u32, i: usize| self.sides.point(v, regions[i]);
-        let own: Vec<u32> = (0..regions.len()).map(|i| at(hole.a, i)).collect();
-        let around: Vec<u32> =
-            hole.faces.iter().enumerate().flat_map(|(i, (face, _))| face.map(|v| at(v, i))).collect();
-        self.overshoot(&own, &around, f)
     }
 
     /// How far the value of field `f` at a vertex, given its points, exceeds the range of those at the points around it, as a fraction of the
@@ -227,7 +220,7 @@ pub(crate) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     let sides = || mesh.sides.iter().map(|side| mesh.positions[side.point as usize]);
     field_lattice::set_extremes(&mut fields, &chosen, || mesh.positions.iter().copied().chain(sides()));
     let sides = match chosen.iter().any(|field| sides::jumps(field)) {
-        true => Sides::of(mesh, &chosen, &preserve::numbers(config, mesh)?.0),
+        true => Sides::of(mesh, &chosen, &region_labels::numbers(config, mesh)?.0),
         false => Sides::default(),
     };
     Ok(on_lattices(mesh, placed, &chosen, fields, sides))

@@ -2,4 +2,5 @@
 
 pub(crate) mod interface;
 pub(crate) mod preserve;
+pub(crate) mod region_labels;
 pub(crate) mod restrictions;

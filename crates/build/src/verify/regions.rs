@@ -1,7 +1,7 @@
 //! Checks that regions are those of the input, and that their interfaces stay in all meshes.
 
 use super::mesh_checks::{PlainMesh, PlainReference};
-use crate::restrict::preserve::labels;
+use crate::restrict::region_labels::labels;
 use std::collections::BTreeMap;
 use tetralod::mesh::{FACES, NONE, TetMesh};
 use tetralod::mt::Regions;
