@@ -13,7 +13,7 @@ const LISTS = ["isosurfaces", "slices"] as const;
 const FLOWS = ["streamlines", "arrows"] as const;
 
 /** What is asked of a field. */
-type Field = Pick<FieldInfo, "name" | "min" | "max"> & Partial<Pick<FieldInfo, "vector">>;
+type Field = Pick<FieldInfo, "name" | "min" | "max"> & Partial<Pick<FieldInfo, "vector" | "isLabel">>;
 
 /** What is asked of a volume. */
 export interface Volume {
@@ -93,9 +93,9 @@ type Judge = (value: any) => string | undefined;
 /**
  * What of a scene fits a volume: fields that it has, values that one of its fields has, planes, boxes and points that meet its box,
  * lengths of its order. Where no part is named, or nothing is left that shows anything, it is what is drawn first. The scene is one that
- * wasm has taken.
+ * wasm has taken. `shown` is the field that is shown.
  */
-export function fitScene(scene: SceneState, volume: Volume): { scene: SceneState; dropped: Misfit[]; isFirst: boolean } {
+export function fitScene(scene: SceneState, volume: Volume, shown?: string): { scene: SceneState; dropped: Misfit[]; isFirst: boolean } {
   const { fields, bounds } = volume;
   const dropped: Misfit[] = [];
   /** Whether it fits: without a problem; else that is told. */
@@ -112,6 +112,8 @@ export function fitScene(scene: SceneState, volume: Volume): { scene: SceneState
     return Object.fromEntries(Object.entries(state).filter(fits)) as S;
   };
   const field = (name: string) => (isKnown(name, fields) ? undefined : unknown(name, fields));
+  /** What has values between two others: no label. */
+  const between = (name = shown) => (fields.some((one) => one.name === name && one.isLabel) ? `'${name}' is a label: between two labels there is no value` : undefined);
   const hasValue = (low: number, high: number) => fields.some(({ min, max }) => high >= min && low <= max);
   const value = (number: number) => (hasValue(number, number) ? undefined : `no field has the value ${number}`);
   const range = ([low, high]: [number, number]) => (hasValue(low, high) ? undefined : `no field has a value from ${low} to ${high}`);
@@ -134,13 +136,15 @@ export function fitScene(scene: SceneState, volume: Volume): { scene: SceneState
   const isInside = (point: number[]) => point.every((x, i) => x >= bounds[i] && x <= bounds[i + 3]);
 
   const known = (names: (string | number)[]) => noRegion(names, volume);
-  const threshold: Judge = (one: ThresholdState) => (one.field && field(one.field)) || range(one.range);
+  const threshold: Judge = (one: ThresholdState) => (one.field && field(one.field)) || range(one.range) || (one.cut ? between(one.field) : undefined);
   const deform: Judge = ({ field }) => noVector(field, fields);
   const fitted = only(scene, "", { clipBox: overlaps, region: overlaps, regions: known, deform, threshold });
+  fitted.isosurfaces &&= fitted.isosurfaces.filter((_, i) => keep(`isosurfaces[${i}]`, between()));
   fitted.isosurfaces &&= fitted.isosurfaces.map((one, i) => only(one, `isosurfaces[${i}]`, { field, value }));
   fitted.slices &&= fitted.slices.map((one, i) => only(one, `slices[${i}]`, { field }));
   fitted.slices &&= fitted.slices.filter((slice, i) => keep(`slices[${i}]`, meets(slice)));
   fitted.clips &&= fitted.clips.filter((clip, i) => keep(`clips[${i}]`, leaves(clip)));
+  if (fitted.volume && !keep("volume", between())) delete fitted.volume;
   fitted.volume &&= only(fitted.volume, "volume", { opacities: values, points: values, unitLength: length });
   const sheer: Judge = (opacities) => known(Object.keys(opacities));
   fitted.boundary &&= only(fitted.boundary, "boundary", { regionOpacities: sheer });
@@ -150,7 +154,8 @@ export function fitScene(scene: SceneState, volume: Volume): { scene: SceneState
   const flow = <F extends StreamlineState | ArrowState>(state: F, part: string): F | undefined => {
     const missing = (state.fields ?? []).find((name) => !isKnown(name, fields));
     const fits = keep(part, missing === undefined ? undefined : unknown(missing, fields));
-    return fits ? only(state, part, { field, radius: length, spacing: length }) : undefined;
+    const coloured = (name: string) => field(name) ?? between(name);
+    return fits ? only(state, part, { field: coloured, radius: length, spacing: length }) : undefined;
   };
   fitted.streamlines &&= flow(fitted.streamlines, "streamlines");
   fitted.arrows &&= flow(fitted.arrows, "arrows");

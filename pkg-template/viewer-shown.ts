@@ -57,9 +57,10 @@ export class Shown {
     const info = this.#volume ? undefined : this.#viewer.info();
     if (!info) return;
     this.#volume = { ...info, bounds: Array.from(this.#viewer.bounds()) };
-    const { scene = this.scene, camera } = this.#wanted ?? {};
+    const { scene = this.scene, camera, request } = this.#wanted ?? {};
     this.#wanted = undefined;
-    ({ scene: this.scene, dropped: this.#dropped, isFirst: this.#isFirst } = fitScene(scene, this.#volume));
+    const { field = info.fields[info.firstField]?.name } = (request ?? {}) as { field?: string };
+    ({ scene: this.scene, dropped: this.#dropped, isFirst: this.#isFirst } = fitScene(scene, this.#volume, field));
     this.#viewer.setScene(this.scene);
     try {
       if (camera) this.#viewer.setCamera(camera);

@@ -208,6 +208,6 @@ function leaveOutOverlaps(ticks) {
 
 export function attachScene() {
   store.subscribe(LOOKS, draw);
-  // The colour bar may come before the volume, which has the units.
-  store.subscribe(["field"], () => !$("legend").hidden && showLegend(viewer().legend));
+  // The colour bar may come before the volume, which has the units; what is said of labels depends on the view.
+  store.subscribe(["field", "view", "also"], () => !$("legend").hidden && showLegend(viewer().legend));
 }

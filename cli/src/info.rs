@@ -340,7 +340,8 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     };
     parts.push((rest, opened.bytes as f64 - known));
     // Few files keep any.
-    parts.retain(|(name, bytes)| *bytes != 0.0 || !["exact values", "errors of tetrahedra"].contains(name));
+    let rare = ["exact values", "errors of tetrahedra", "values for each region"];
+    parts.retain(|(name, bytes)| *bytes != 0.0 || !rare.contains(name));
     let vertices = f64::from(opened.info()?.vertices.max(1));
     let part =
         |(name, bytes): (&'static str, f64)| FilePart { name, bytes, bytes_per_vertex: bytes / vertices };

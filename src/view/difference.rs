@@ -13,7 +13,7 @@ use glam::DVec3;
 ///
 /// let positions = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// let (tets, neighbors) = ([[0, 1, 2, 3]], [[NONE; 4]]);
-/// let mesh = |field| MeshView { positions: &positions, field, tets: &tets, neighbors: &neighbors };
+/// let mesh = |field| MeshView { positions: &positions, field, tets: &tets, neighbors: &neighbors, is_label: false };
 /// let difference = Difference::of(&mesh(&[3.0; 4]), mesh(&[1.0; 4])).expect("there is a tetrahedron");
 /// assert_eq!((difference.values, difference.largest), (vec![2.0; 4], 2.0));
 /// ```

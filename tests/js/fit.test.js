@@ -17,6 +17,26 @@ const volume = {
 const fit = (/** @type {any} */ scene) => fitScene(scene, volume);
 const parts = (scene) => fit(scene).dropped.map(({ part }) => part);
 
+test("of a label nothing is kept that needs values between two", () => {
+  const fields = [...volume.fields, { name: "m", min: 1, max: 4, isLabel: true }];
+  /** @type {any} */
+  const scene = {
+    isosurfaces: [{ value: 2 }],
+    volume: {},
+    threshold: { range: [1, 2], cut: true },
+    slices: [{ normal: [0, 0, 1], offset: 1 }],
+    streamlines: { fields: ["p", "u", "u"], field: "m" },
+  };
+  const of = (/** @type {string} */ shown) => fitScene(scene, { ...volume, fields }, shown);
+  const { scene: left, dropped } = of("m");
+  assert.deepEqual(dropped.map(({ part }) => part).sort(), ["isosurfaces[0]", "streamlines.field", "threshold", "volume"]);
+  assert.deepEqual(left, { isosurfaces: [], slices: scene.slices, streamlines: { fields: ["p", "u", "u"] } });
+  assert.deepEqual(
+    of("u").dropped.map(({ part }) => part),
+    ["streamlines.field"],
+  );
+});
+
 test("what fits stays as it is", () => {
   const scene = {
     isosurfaces: [{ value: 0.5, field: "u" }, { value: 5.5 }, {}],

@@ -71,8 +71,8 @@ const PARTS: Parts = &[
     ("inner faces", BIT),
     ("errors", ERROR),
     ("levels", LEVEL),
-    ("sides", SIDES),
-    ("sides", SIDE),
+    ("values for each region", SIDES),
+    ("values for each region", SIDE),
 ];
 
 // Families of what all kinds have follow those of edge-based MTs.

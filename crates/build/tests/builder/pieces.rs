@@ -264,7 +264,7 @@ fn what_only_a_whole_tells_is_left_to_it() {
     needs_whole(&good, &tolerant, "a tolerance is given");
     let kept = BuildConfig { keep_points: vec![[0.0; 3]], ..BuildConfig::default() };
     needs_whole(&good, &kept, "regions and single points are kept");
-    let mut many = good.clone();
+    let mut many = pieces(&write(&Folder::new("piecewise-labels"), &bent(7), 2, |t, _| t / 1100));
     for piece in &mut many {
         piece.mesh.fields[0].is_label = true;
     }

@@ -10,7 +10,7 @@ use super::{Legend, SliceState};
 use crate::draw::{Colouring, EdgeLook, Edit, Lighting, Style};
 use std::borrow::Cow;
 use std::cmp::Ordering;
-use tetralod::geom::SingleValues;
+use tetralod::geom::{Bounds, SingleValues};
 use tetralod::mesh::NONE;
 use tetralod::mt::MeshChanges;
 use tetralod::session::TetQuantity;
@@ -432,7 +432,12 @@ fn list_caps<'a>(
     by: &Option<Moves<'_>>,
     edits: &mut Edits<'a>,
 ) -> Result<()> {
-    let planes = if boundary.clipped { clips(input.state) } else { Vec::new() };
+    let mut planes = if boundary.clipped { clips(input.state) } else { Vec::new() };
+    if !planes.is_empty() {
+        // A plane that cuts nothing away may lie in a face of the boundary: a cap there would be drawn into the same pixels.
+        let bounds = input.mesh.bounds();
+        planes.retain(|plane| cuts(plane, &bounds));
+    }
     let opacities = distinct(input.opacities.clone(), f64::total_cmp);
     let part = |opacity: f64| {
         let has = |t: usize| input.opacities[usize::from(input.regions[t])] == opacity;
@@ -459,6 +464,14 @@ fn list_caps<'a>(
     list_each(caps, CAPS, &cutting, edits, |own, key, (state, tets)| {
         own.update(input, &MeshView { tets, ..input.mesh }, by, key, state)
     })
+}
+
+/// Whether anything of a box is behind a plane by more than rounding.
+fn cuts(plane: &ClipPlane, bounds: &Bounds) -> bool {
+    let Bounds { min, max } = *bounds;
+    let sum = |of: fn(f64, f64, f64) -> f64| (0..3).map(|i| of(plane.normal[i], min[i], max[i])).sum::<f64>();
+    sum(|n, low, high| (n * low).max(n * high))
+        > plane.offset + 1e-9 * sum(|n, low, high| n.abs() * (high - low))
 }
 
 fn list_undeformed<'a>(own: &'a mut BoundarySurface, input: &Input<'a>, edits: &mut Edits<'a>) {
