@@ -128,8 +128,10 @@ export function draw() {
   text("shade", `${shade} %`);
   if (!shows("volume")) hideRefusal();
   const isPlain = (mode() === "iso" && !by) || (mode() === "solid" && isByRegion());
-  $("colours").hidden = isPlain && !beside().some((name) => name !== "solid");
-  $("range").hidden = !isByField() || shownField().isLabel;
+  // Labels have colours of their own.
+  const isOfLabels = shownField().isLabel && (isByField() || isBoundaryOfLabels(mode()));
+  $("colours").hidden = isOfLabels || (isPlain && !beside().some((name) => name !== "solid"));
+  $("range").hidden = !isByField();
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [], streamlines: null, arrows: null };
   const parts = [...beside(), mode()].map((name) => (isBoundaryOfLabels(name) ? { boundary: { opacity: opacityOf(name) } } : PARTS[name]()));
   const compare = comparison();

@@ -64,6 +64,9 @@ impl Face {
     }
 }
 
+/// Where the corners of a face are, ascending, and the tetrahedron and the corner that it is opposite.
+type PlacedFace = ([[u64; 3]; 3], (u32, usize));
+
 impl Cutter<'_> {
     fn is_within(&self, point: u32) -> bool {
         let value = self.by[point as usize];
@@ -95,7 +98,7 @@ impl Cutter<'_> {
             let other = if n == NONE { return false } else { mesh.tets[n as usize] };
             mesh.tets[t as usize].iter().filter(|v| other.contains(v)).count() < 3
         };
-        let mut faces: Vec<([[u64; 3]; 3], (u32, usize))> = Vec::new();
+        let mut faces: Vec<PlacedFace> = Vec::new();
         for &(t, i) in alone {
             let own = whole(t);
             if mesh.neighbors[own as usize].into_iter().any(|n| is_at_other_points(own, n)) {
@@ -109,9 +112,8 @@ impl Cutter<'_> {
         let mut pairs = Vec::new();
         for group in faces.chunk_by(|a, b| a.0 == b.0) {
             for (k, (_, a)) in group.iter().enumerate() {
-                let is_beside = |(_, b): &&([[u64; 3]; 3], (u32, usize))| {
-                    mesh.neighbors[whole(a.0) as usize].contains(&whole(b.0))
-                };
+                let is_beside =
+                    |(_, b): &&PlacedFace| mesh.neighbors[whole(a.0) as usize].contains(&whole(b.0));
                 pairs.extend(group[k + 1..].iter().find(is_beside).map(|(_, b)| [*a, *b]));
             }
         }

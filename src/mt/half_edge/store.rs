@@ -216,9 +216,8 @@ impl HalfEdgeMt {
         let sides = new.side_residuals;
         let fits_field =
             |(i, residual): (usize, &i32)| residual.unsigned_abs() < 1 << (fields[i % fields.len()].bits + 1);
-        if !sides.is_empty() && !(self.has_sides() && sides.len().is_multiple_of(fields.len()))
-            || !sides.iter().enumerate().all(fits_field)
-        {
+        let is_allowed = sides.is_empty() || (self.has_sides() && sides.len().is_multiple_of(fields.len()));
+        if !is_allowed || !sides.iter().enumerate().all(fits_field) {
             return Err(UpdateError::OffLattice { update });
         }
         if new.errors.len() == fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }

@@ -99,7 +99,7 @@ fn shared_lattice(steps: &[&Field], config: &BuildConfig) -> Result<FieldInfo, B
 fn integer_lattice(steps: &[&Field], min: f64, max: f64) -> Option<FieldInfo> {
     let bits = (1..=MAX_FIELD_BITS).find(|&bits| max - min < f64::from(1_u32 << bits))?;
     let is_integer = |field: &&Field| field.integer || field.is_label;
-    let all = steps.iter().all(|field| is_integer(&field) && field.all_values().all(is_exact_integer));
+    let all = steps.iter().all(|field| is_integer(field) && field.all_values().all(is_exact_integer));
     let name = steps[0].name.clone();
     all.then(|| FieldInfo { name, min, max, origin: min, step: 1.0, bits, ..FieldInfo::default() })
 }
