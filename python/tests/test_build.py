@@ -198,7 +198,7 @@ def test_labels_at_points_are_those_of_most_volume_around(folder):
     most = around.max(axis=1, keepdims=True)
     expected = labels[(around >= most * (1 - 1e-12)).argmax(axis=1)]
     clear = (around > most * (1 - 1e-9)).sum(axis=1) == 1
-    mt = tetralod.build("cells.vtu", cell_to_point=True, all_fields=True, labels={"load": False}, output="labels.mt")
+    mt = tetralod.build("cells.vtu", cell_to_point=True, all_fields=True, labels={"load": False})
     assert [field.is_label for field in mt.info.fields] == [True, False]
     assert mt.info.fields[mt.info.first_field].name == "load"
     mesh = mt.refine(error=0)
