@@ -111,6 +111,20 @@ fn satisfy(mt: &HalfEdgeMt, front: &mut Front, request: &Request) {
     assert!(outcome.expect("a valid MT").satisfied);
 }
 
+/// The MT with other residuals in further regions at one update.
+fn with_residuals(mt: &HalfEdgeMt, update: u32, residuals: &[i32]) -> HalfEdgeMt {
+    let record = |u: u32| {
+        let own = mt.update(UpdateId(u)).expect("it is here");
+        if u == update { HalfEdgeUpdate { side_residuals: residuals, ..own } } else { own }
+    };
+    let page = update >> mt.page_bits();
+    let records: Vec<HalfEdgeUpdate<'_>> = mt.page_updates(page).map(record).collect();
+    let mut changed = mt.clone();
+    changed.remove_page(page).expect("it is here");
+    changed.insert_page(page, &records).expect("a sound page");
+    changed
+}
+
 /// Checks every corner of a mesh against the means of the input, in a field at cells.
 fn check_corners(mt: &HalfEdgeMt, mesh: &CurrentMesh, input: &TetMesh, field: usize) {
     mesh.check().expect("a sound mesh");
@@ -209,30 +223,10 @@ fn verification_holds_on_each_side_and_finds_what_is_wrong() {
     let record = mt.update(UpdateId(update)).expect("it is here");
     let mut residuals = record.side_residuals.to_vec();
     residuals[2] += 40;
-    let page = mt.page_updates(update >> mt.page_bits());
-    let records: Vec<HalfEdgeUpdate<'_>> = page
-        .clone()
-        .map(|u| {
-            let own = mt.update(UpdateId(u)).expect("it is here");
-            if u == update { HalfEdgeUpdate { side_residuals: &residuals, ..own } } else { own }
-        })
-        .collect();
-    let mut tampered = mt.clone();
-    tampered.remove_page(update >> mt.page_bits()).expect("it is here");
-    tampered.insert_page(update >> mt.page_bits(), &records).expect("a sound page");
-    let report = valid(&tampered);
-    assert!(!report.valid);
-    // Values for regions that the vertex is not in.
+    assert!(!valid(&with_residuals(&mt, update, &residuals)).valid);
+    // Values for regions that the vertex is not in: what it needs shows when it is applied.
     residuals.extend_from_within(..4);
-    let records: Vec<HalfEdgeUpdate<'_>> = page
-        .map(|u| {
-            let own = mt.update(UpdateId(u)).expect("it is here");
-            if u == update { HalfEdgeUpdate { side_residuals: &residuals, ..own } } else { own }
-        })
-        .collect();
-    let mut tampered = mt.clone();
-    tampered.remove_page(update >> mt.page_bits()).expect("it is here");
-    tampered.insert_page(update >> mt.page_bits(), &records).expect("what it needs shows when it is applied");
+    let tampered = with_residuals(&mt, update, &residuals);
     let criterion = LodCriterion::new(mt.info(), &Request::within(0.0));
     let mut front = Front::new(&tampered).expect("a valid base mesh");
     assert!(front.satisfy(&tampered, &criterion, Request::within(0.0).budget).is_err());
