@@ -100,7 +100,7 @@ pub(crate) use mesh::tet::corner_of;
 pub(crate) use pages::updates_of_page;
 pub(crate) use reaches::{Extent, Reaches};
 #[doc(hidden)]
-pub use regions::{BaseSides, MAX_REGIONS, numbers_of, regions_of_vertices};
+pub use regions::{BaseSides, MAX_REGIONS, further_regions, numbers_of};
 pub use regions::{RegionInfo, Regions};
 pub(crate) use replay::apply_next;
 #[doc(hidden)]

@@ -116,8 +116,8 @@ impl Regions {
     }
 }
 
-/// The regions of each of so many vertices, ascending, given those of the tetrahedra.
-pub fn regions_of_vertices(vertices: usize, tets: &[[u32; 4]], regions: &[u16]) -> Vec<Vec<u16>> {
+/// The regions of each of so many vertices but its first, given those of the tetrahedra: vertex and region, ascending.
+pub fn further_regions(vertices: usize, tets: &[[u32; 4]], regions: &[u16]) -> Vec<(u32, u16)> {
     let mut all = vec![Vec::new(); vertices];
     for (tet, &region) in tets.iter().zip(regions) {
         for &v in tet {
@@ -127,7 +127,8 @@ pub fn regions_of_vertices(vertices: usize, tets: &[[u32; 4]], regions: &[u16]) 
             }
         }
     }
-    all
+    let further = |(v, own): (u32, Vec<u16>)| own.into_iter().skip(1).map(move |region| (v, region));
+    (0..).zip(all).flat_map(further).collect()
 }
 
 /// Tetrahedra, volume, box and colour of each of so many regions in a mesh whose lattice has these steps.

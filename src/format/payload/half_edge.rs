@@ -17,7 +17,7 @@ use crate::mesh::NONE;
 use crate::mt::{
     BaseMark, BaseMesh, BaseMeshError, BaseSides, ErrorCode, ForestChild, HalfEdgeMt, HalfEdgeUpdate,
     MtFacts, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
-    regions_of_vertices,
+    further_regions,
 };
 use crate::threads;
 use std::ops::Range;
@@ -519,14 +519,13 @@ pub fn base_sides(base: &BaseMesh, of_base: &[u16], of_fields: &[Option<Vec<i32>
     if of_fields.iter().all(Option::is_none) {
         return Some(BaseSides::default());
     }
-    let own = regions_of_vertices(base.positions.len(), &base.tets, of_base);
-    let rows: Vec<usize> = (0..).zip(&own).flat_map(|(v, own)| own.iter().skip(1).map(move |_| v)).collect();
+    let rows = further_regions(base.positions.len(), &base.tets, of_base);
     if of_fields.iter().flatten().any(|levels| levels.len() != rows.len()) {
         return None;
     }
     let fields = of_fields.len();
-    let level = |(row, &v): (usize, &usize), field: usize| {
-        of_fields[field].as_ref().map_or(base.values[v * fields + field], |levels| levels[row])
+    let level = |(row, &(v, _)): (usize, &(u32, u16)), field: usize| {
+        of_fields[field].as_ref().map_or(base.values[v as usize * fields + field], |levels| levels[row])
     };
     let levels = rows.iter().enumerate().flat_map(|row| (0..fields).map(move |field| level(row, field)));
     Some(BaseSides { jumps: of_fields.iter().map(Option::is_some).collect(), levels: levels.collect() })

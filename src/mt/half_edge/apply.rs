@@ -15,7 +15,7 @@ use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{Gather, Star};
 use crate::mt::mesh::tet::corner_of;
 use crate::mt::pages::Page;
-use crate::mt::regions::regions_of_vertices;
+use crate::mt::regions::further_regions;
 use crate::mt::{
     Applied, ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MultiTessellation, PageError,
     UpdateError, UpdateId, UpdatePages, VertexId,
@@ -447,12 +447,12 @@ impl ApplyUpdates for HalfEdgeMt {
             if self.has_sides() {
                 mesh.keep_sides(regions.sides.jumps.clone());
                 let vertices = self.base().positions.len();
-                let of_vertices = regions_of_vertices(vertices, &self.base().tets, &regions.of_base);
-                let further = (0..)
-                    .zip(&of_vertices)
-                    .flat_map(|(v, own)| own.iter().skip(1).map(move |&region| (v, region)));
+                let further = further_regions(vertices, &self.base().tets, &regions.of_base);
                 let rows = regions.sides.levels.chunks(mesh.fields);
-                further.zip(rows).for_each(|((v, region), levels)| mesh.add_side(v, region, levels));
+                further
+                    .into_iter()
+                    .zip(rows)
+                    .for_each(|((v, region), levels)| mesh.add_side(v, region, levels));
                 mesh.update_corners();
             }
         }

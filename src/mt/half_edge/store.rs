@@ -28,7 +28,7 @@ use crate::mt::error::Result;
 use crate::mt::facts::MtFacts;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::pages::{Page, Pages, Rows};
-use crate::mt::regions::{RegionInfo, Regions, measure, regions_of_vertices};
+use crate::mt::regions::{RegionInfo, Regions, further_regions, measure};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
     BaseMesh, CurrentMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId,
@@ -304,12 +304,10 @@ impl HalfEdgeMt {
     fn check_sides(&self, Regions { sides, of_base, .. }: &Regions) -> Result<()> {
         let fields = self.info.fields.len();
         let vertices = self.base.positions.len();
-        let of_vertices = if sides.jumps.is_empty() {
-            Vec::new()
-        } else {
-            regions_of_vertices(vertices, &self.base.tets, of_base)
+        let rows = match sides.jumps.is_empty() {
+            true => 0,
+            false => further_regions(vertices, &self.base.tets, of_base).len(),
         };
-        let rows: usize = of_vertices.iter().map(|own| own.len().saturating_sub(1)).sum();
         let is_sound = (sides.jumps.is_empty() || sides.jumps.len() == fields)
             && sides.levels.len() == rows * fields
             && sides.levels.chunks(fields).all(|levels| self.info.holds([0; 3], levels));

@@ -6,7 +6,7 @@ use crate::order::base::Numbered;
 use tetralod::mesh::NONE;
 use tetralod::mt::{
     BaseMark, BaseMesh, BaseSides, ErrorCode, Forest, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate,
-    Regions, VertexId, by_corner, regions_of_vertices,
+    Regions, VertexId, by_corner, further_regions,
 };
 
 /// Updates in their order. Vertices are numbers of reference points.
@@ -102,10 +102,8 @@ fn base_sides(
     (levels, sides): (&[i32], &Sides),
 ) -> BaseSides {
     let fields = sides.jumps.len();
-    let of_vertices = regions_of_vertices(mesh.positions.len(), &mesh.tets, of_base);
-    let further = points.iter().zip(&of_vertices).flat_map(|(&point, own)| {
-        own.iter().skip(1).map(move |&region| sides.point(point, u32::from(region)))
-    });
-    let rows = further.flat_map(|point| &levels[point as usize * fields..][..fields]);
+    let further = further_regions(mesh.positions.len(), &mesh.tets, of_base).into_iter();
+    let point = |(v, region): (u32, u16)| sides.point(points[v as usize], u32::from(region)) as usize;
+    let rows = further.flat_map(|side| &levels[point(side) * fields..][..fields]);
     BaseSides { jumps: sides.jumps.clone(), levels: rows.copied().collect() }
 }
