@@ -243,9 +243,9 @@ impl Folder<'_> {
                 )
             })
         };
-        let whole = plan.nodes()[0];
-        let part = self.read(&self.built(whole), &command_for(whole, plan))?;
-        let built = with_progress(verbosity, |progress| parts::assemble(part, &updates, progress))?;
+        let left =
+            |node: Node| self.read(&self.built(node), &command_for(node, plan)).map_err(PartsError::other);
+        let built = with_progress(verbosity, |progress| parts::assemble(plan, &left, &updates, progress))?;
         built.map_err(said)
     }
 

@@ -41,43 +41,63 @@ impl MtFacts {
 /// So many tetrahedra are added up together. Sums may depend on it by rounding, but not on the number of threads.
 const SHARE: usize = 1 << 16;
 
-/// Field by field, the volume of a mesh in each of [`VOLUME_BINS`] equal bins of the field's values; 1 in the first one where there is but one
-/// value.
+/// [`LevelVolumes`] of a mesh.
 pub(crate) fn level_volumes(info: &MtInfo, mesh: &CurrentMesh) -> Vec<f64> {
-    let empty = |field: &super::FieldInfo| {
-        (field.max > field.min).then(|| Histogram::new(field.min, field.max, VOLUME_BINS))
-    };
-    let empty: Vec<Option<Histogram>> = info.fields.iter().map(empty).collect();
-    let of_ranges = threads::map(mesh.tet_slots(), SHARE, |tets| {
-        let mut histograms = empty.clone();
-        for tet in tets.filter_map(|t| mesh.tet(t as u32)) {
-            // Shares are the same in units of the lattice.
-            let corners = tet.map(|slot| mesh.positions()[slot as usize].map(f64::from));
-            for (number, field) in info.fields.iter().enumerate() {
-                let Some(histogram) = &mut histograms[number] else { continue };
-                histogram.add(corners, tet.map(|slot| field.value(mesh.levels(slot)[number])));
+    let mut volumes = LevelVolumes::new(info);
+    volumes.add(info, mesh);
+    volumes.finish()
+}
+
+/// Field by field, the volume of meshes in each of [`VOLUME_BINS`] equal bins of the field's values; 1 in the first one where there is but one
+/// value.
+pub(crate) struct LevelVolumes(Vec<Option<Histogram>>);
+
+impl LevelVolumes {
+    /// Of no mesh yet.
+    pub fn new(info: &MtInfo) -> Self {
+        let empty = |field: &super::FieldInfo| {
+            (field.max > field.min).then(|| Histogram::new(field.min, field.max, VOLUME_BINS))
+        };
+        Self(info.fields.iter().map(empty).collect())
+    }
+
+    /// Adds a mesh.
+    pub fn add(&mut self, info: &MtInfo, mesh: &CurrentMesh) {
+        let empty = Self::new(info).0;
+        let of_ranges = threads::map(mesh.tet_slots(), SHARE, |tets| {
+            let mut histograms = empty.clone();
+            for tet in tets.filter_map(|t| mesh.tet(t as u32)) {
+                // Shares are the same in units of the lattice.
+                let corners = tet.map(|slot| mesh.positions()[slot as usize].map(f64::from));
+                for (number, field) in info.fields.iter().enumerate() {
+                    let Some(histogram) = &mut histograms[number] else { continue };
+                    histogram.add(corners, tet.map(|slot| field.value(mesh.levels(slot)[number])));
+                }
+            }
+            histograms
+        });
+        for histograms in of_ranges {
+            for (sum, histogram) in self.0.iter_mut().zip(histograms) {
+                let (Some(sum), Some(histogram)) = (sum, histogram) else { continue };
+                sum.merge(&histogram);
             }
         }
-        histograms
-    });
-    let mut sums = empty;
-    for histograms in of_ranges {
-        for (sum, histogram) in sums.iter_mut().zip(histograms) {
-            let (Some(sum), Some(histogram)) = (sum, histogram) else { continue };
-            sum.merge(&histogram);
-        }
     }
-    let volumes = |histogram: Option<Histogram>| {
-        let mut volumes = vec![0.0; VOLUME_BINS];
-        volumes[0] = 1.0;
-        if let Some(histogram) = histogram {
-            volumes = histogram.volumes();
-            // Rounding may have moved values beyond the ends.
-            let [below, above] = histogram.outside();
-            volumes[0] += below;
-            volumes[VOLUME_BINS - 1] += above;
-        }
-        volumes
-    };
-    sums.into_iter().flat_map(volumes).collect()
+
+    /// Field by field and bin by bin.
+    pub fn finish(self) -> Vec<f64> {
+        let volumes = |histogram: Option<Histogram>| {
+            let mut volumes = vec![0.0; VOLUME_BINS];
+            volumes[0] = 1.0;
+            if let Some(histogram) = histogram {
+                volumes = histogram.volumes();
+                // Rounding may have moved values beyond the ends.
+                let [below, above] = histogram.outside();
+                volumes[0] += below;
+                volumes[VOLUME_BINS - 1] += above;
+            }
+            volumes
+        };
+        self.0.into_iter().flat_map(volumes).collect()
+    }
 }

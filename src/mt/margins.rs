@@ -60,13 +60,16 @@ impl Margins {
         let tets = tets.iter().filter_map(|&t| Some((mt.creator(mesh, t), mesh.tet(t)?)));
         let tets = tets.map(|(parent, corners)| (parent, corners.map(|v| mesh.levels(v))));
         self.find_beyond(tets.clone(), parents, beyond);
-        self.note(tets.flat_map(|(_, levels)| levels));
+        let update = self.removed.len() / self.levels.len().max(1);
+        self.note(UpdateId(update as u32), tets.flat_map(|(_, levels)| levels));
     }
 
-    /// Takes the next update, given the levels of the vertices of what it removes.
-    pub fn note<'a>(&mut self, vertices: impl Iterator<Item = &'a [i32]>) {
-        let own = self.removed.len();
-        self.removed.resize(own + self.levels.len(), [i32::MAX, i32::MIN]);
+    /// Takes an update, given the levels of the vertices of what it removes.
+    pub fn note<'a>(&mut self, update: UpdateId, vertices: impl Iterator<Item = &'a [i32]>) {
+        let own = update.0 as usize * self.levels.len();
+        if self.removed.len() < own + self.levels.len() {
+            self.removed.resize(own + self.levels.len(), [i32::MAX, i32::MIN]);
+        }
         for levels in vertices {
             for (all, &level) in self.removed[own..].iter_mut().zip(levels) {
                 *all = [all[0].min(level), all[1].max(level)];

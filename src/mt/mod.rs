@@ -74,7 +74,7 @@ pub use explicit::store::ExplicitMt;
 pub use explicit::store::ExplicitUpdate;
 pub(crate) use facts::{MtFacts, VOLUME_BINS, level_volumes};
 #[doc(hidden)]
-pub use half_edge::builder::{Forest, HalfEdgeBuilder, NextUpdate};
+pub use half_edge::builder::{Forest, HalfEdgeBuilder, NextUpdate, Patch};
 #[doc(hidden)]
 pub use half_edge::removers::by_corner;
 pub use half_edge::store::HalfEdgeMt;

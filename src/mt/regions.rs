@@ -131,37 +131,63 @@ pub fn further_regions(vertices: usize, tets: &[[u32; 4]], regions: &[u16]) -> V
     (0..).zip(all).flat_map(further).collect()
 }
 
-/// Tetrahedra, volume, box and colour of each of so many regions in a mesh whose lattice has these steps.
-pub(crate) fn measure(mesh: &CurrentMesh, step: [f64; 3], regions: usize) -> Vec<RegionInfo> {
-    let empty = RegionInfo { bounds: [[i32::MAX; 3], [i32::MIN; 3]], ..RegionInfo::default() };
-    let mut all = vec![empty; regions];
-    // Whole numbers add up to the same in any order.
-    let mut sixths = vec![0_i128; regions];
-    let mut touching = BTreeSet::new();
-    for (t, &region) in (0..).zip(mesh.regions()) {
-        let (Some(tet), Some(info)) = (mesh.tet(t), all.get_mut(usize::from(region))) else { continue };
-        let around = mesh.neighbors()[t as usize].into_iter().filter(|&n| n != NONE);
-        touching.extend(around.map(|n| [region, mesh.region(n)]).filter(|[a, b]| b < a));
-        let corners = tet.map(|v| mesh.positions()[v as usize]);
-        info.tetrahedra += 1;
-        let [a, b, c, d] = corners;
-        sixths[usize::from(region)] += orient3d(a, b, c, d);
-        let [low, high] = &mut info.bounds;
-        for p in corners {
-            *low = [0, 1, 2].map(|k| low[k].min(p[k]));
-            *high = [0, 1, 2].map(|k| high[k].max(p[k]));
+/// Tetrahedra, volume, box and colour of regions, found mesh by mesh.
+pub(crate) struct RegionSums {
+    all: Vec<RegionInfo>,
+    /// Six times the volume of each. Whole numbers add up to the same in any order.
+    sixths: Vec<i128>,
+    touching: BTreeSet<[u16; 2]>,
+}
+
+impl RegionSums {
+    /// Of so many regions, of which nothing has come yet.
+    pub fn new(regions: usize) -> Self {
+        let empty = RegionInfo { bounds: [[i32::MAX; 3], [i32::MIN; 3]], ..RegionInfo::default() };
+        Self { all: vec![empty; regions], sixths: vec![0; regions], touching: BTreeSet::new() }
+    }
+
+    /// Adds a mesh.
+    pub fn add(&mut self, mesh: &CurrentMesh) {
+        self.add_touching(mesh);
+        for (t, &region) in (0..).zip(mesh.regions()) {
+            let own = self.all.get_mut(usize::from(region));
+            let (Some(tet), Some(info)) = (mesh.tet(t), own) else { continue };
+            let corners = tet.map(|v| mesh.positions()[v as usize]);
+            info.tetrahedra += 1;
+            let [a, b, c, d] = corners;
+            self.sixths[usize::from(region)] += orient3d(a, b, c, d);
+            let [low, high] = &mut info.bounds;
+            for p in corners {
+                *low = [0, 1, 2].map(|k| low[k].min(p[k]));
+                *high = [0, 1, 2].map(|k| high[k].max(p[k]));
+            }
         }
     }
-    for (info, sixths) in all.iter_mut().zip(sixths) {
-        info.volume = sixths as f64 / 6.0 * step[0] * step[1] * step[2];
+
+    /// Notes which regions touch in a mesh, and no more of it.
+    pub fn add_touching(&mut self, mesh: &CurrentMesh) {
+        let of_tets = (0..).zip(mesh.regions()).filter(|(t, _)| mesh.tet(*t).is_some());
+        for (t, &region) in of_tets.filter(|(_, region)| usize::from(**region) < self.all.len()) {
+            let around = mesh.neighbors()[t as usize].into_iter().filter(|&n| n != NONE);
+            self.touching.extend(around.map(|n| [region, mesh.region(n)]).filter(|[a, b]| b < a));
+        }
     }
-    for (region, around) in (0..).zip(neighbors_before(regions, &touching)) {
-        let is_free = |color: &u8| around.iter().all(|&other: &u16| all[usize::from(other)].color != *color);
-        let own = (region % usize::from(REGION_COLORS)) as u8;
-        let mut colors = (0..REGION_COLORS).map(|k| (own + k) % REGION_COLORS);
-        all[region].color = colors.find(is_free).unwrap_or(own);
+
+    /// What has been found, where the lattice has these steps.
+    pub fn finish(self, step: [f64; 3]) -> Vec<RegionInfo> {
+        let Self { mut all, sixths, touching } = self;
+        for (info, sixths) in all.iter_mut().zip(sixths) {
+            info.volume = sixths as f64 / 6.0 * step[0] * step[1] * step[2];
+        }
+        for (region, around) in (0..).zip(neighbors_before(all.len(), &touching)) {
+            let is_free =
+                |color: &u8| around.iter().all(|&other: &u16| all[usize::from(other)].color != *color);
+            let own = (region % usize::from(REGION_COLORS)) as u8;
+            let mut colors = (0..REGION_COLORS).map(|k| (own + k) % REGION_COLORS);
+            all[region].color = colors.find(is_free).unwrap_or(own);
+        }
+        all
     }
-    all
 }
 
 /// For each region those with smaller numbers that it touches.

@@ -6,7 +6,7 @@
 use super::new_star::{MOST, NEW};
 use super::scratch::Scratch;
 use super::star_code::{KnownStars, StarCode};
-use super::store::{HalfEdgeMt, HalfEdgeUpdate};
+use super::store::{BaseMark, HalfEdgeMt, HalfEdgeUpdate};
 use crate::geom::orient3d;
 use crate::mesh::NONE;
 use crate::mt::error::Result;
@@ -181,6 +181,31 @@ impl HalfEdgeMt {
         found.ok_or(UpdateError::Mask { update: u.0 })?;
         self.perform_insertion(mesh, u, position, scratch);
         Ok(Applied::Done)
+    }
+
+    /// A mesh to which updates can be applied, with what is known of its tetrahedra and, if the MT has regions, the region of each, and where
+    /// fields jump the levels of its vertices in their further regions.
+    pub(super) fn marked(
+        &self,
+        mut mesh: CurrentMesh,
+        marks: &[BaseMark],
+        regions: Option<(&[u16], &[i32])>,
+    ) -> CurrentMesh {
+        mesh.tag_all(marks.iter().map(|mark| mark.remover));
+        mesh.keep_tet_bytes(marks.iter().map(|mark| mark.inner).collect());
+        mesh.whole_stars = true;
+        if let Some((of_tets, levels)) = regions {
+            mesh.regions = of_tets.to_vec();
+            if let Some(jumps) = self.jumps() {
+                mesh.keep_sides(jumps.to_vec());
+                let further = further_regions(mesh.positions.len(), &mesh.tets, of_tets);
+                let rows = levels.chunks(mesh.fields);
+                let sides = further.into_iter().zip(rows);
+                sides.for_each(|((v, region), levels)| mesh.add_side(v, region, levels));
+                mesh.update_corners();
+            }
+        }
+        mesh
     }
 
     pub(super) fn perform_insertion(
@@ -438,25 +463,13 @@ impl UpdatePages for HalfEdgeMt {
 
 impl ApplyUpdates for HalfEdgeMt {
     fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
-        let mut mesh = CurrentMesh::new(self.info(), self.base())?;
-        mesh.tag_all(self.base_marks().iter().map(|mark| mark.remover));
-        mesh.keep_tet_bytes(self.base_marks().iter().map(|mark| mark.inner).collect());
-        mesh.whole_stars = true;
-        if let Some(regions) = self.regions() {
-            mesh.regions.clone_from(&regions.of_base);
-            if self.has_sides() {
-                mesh.keep_sides(regions.sides.jumps.clone());
-                let vertices = self.base().positions.len();
-                let further = further_regions(vertices, &self.base().tets, &regions.of_base);
-                let rows = regions.sides.levels.chunks(mesh.fields);
-                further
-                    .into_iter()
-                    .zip(rows)
-                    .for_each(|((v, region), levels)| mesh.add_side(v, region, levels));
-                mesh.update_corners();
-            }
-        }
-        Ok(mesh)
+        let mesh = CurrentMesh::new(self.info(), self.base())?;
+        let regions = self.regions();
+        Ok(self.marked(
+            mesh,
+            self.base_marks(),
+            regions.map(|regions| (&regions.of_base[..], &regions.sides.levels[..])),
+        ))
     }
 
     #[inline]

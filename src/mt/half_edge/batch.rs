@@ -280,6 +280,12 @@ impl Batch {
         &self.errors[i * fields..][..fields]
     }
 
+    /// The error of an update in one of so many fields; none if it is not one of these.
+    fn error(&self, u: UpdateId, field: usize, fields: usize) -> Option<ErrorCode> {
+        let i = u.0.checked_sub(self.first).filter(|i| (*i as usize) < self.len())?;
+        Some(self.errors_of(i as usize, fields)[field])
+    }
+
     /// Applies the updates to the mesh of those before, and takes down their stars. `names` decide on the order of faces.
     pub fn apply(
         &mut self,
@@ -403,14 +409,22 @@ impl Batch {
     }
 
     /// Codes the stars of the updates that have been applied.
-    pub fn code(&self, mt: &HalfEdgeMt, forest: &Forest, margins: &mut Margins) -> CodedBatch {
+    /// Those before are in the MT, or in `waiting`.
+    pub fn code(
+        &self,
+        mt: &HalfEdgeMt,
+        forest: &Forest,
+        waiting: &[(Self, CodedBatch)],
+        margins: &mut Margins,
+    ) -> CodedBatch {
         let fields = mt.info().fields.len();
         for i in 0..self.applied.len() {
             let [.., levels] = self.ranges(i);
-            margins.note(self.link_levels[levels].chunks(fields));
+            margins.note(UpdateId(self.first + i as u32), self.link_levels[levels].chunks(fields));
         }
         let margins = &*margins;
-        let code = |range: Range<usize>| self.code_share(range, mt, forest, margins);
+        let before = Before { mt, waiting };
+        let code = |range: Range<usize>| self.code_share(range, before, forest, margins);
         CodedBatch(threads::map(self.applied.len(), SHARE, code))
     }
 
@@ -418,15 +432,16 @@ impl Batch {
     fn code_share(
         &self,
         updates: Range<usize>,
-        mt: &HalfEdgeMt,
+        before: Before<'_>,
         forest: &Forest,
         margins: &Margins,
     ) -> Coded {
+        let mt = before.mt;
         let mut coded = Coded::with_room(updates.len(), mt.info().fields.len());
         let mut scratch = CodeScratch::default();
         for (at, i) in updates.enumerate() {
             let star = self.star_of(i, mt);
-            coded.faults.extend(self.fault(&star, mt, margins, &mut scratch));
+            coded.faults.extend(self.fault(&star, before, margins, &mut scratch));
             if let Err(why) = coded.push(at, &star, forest, &mut scratch) {
                 coded.failed = Some(why);
                 break;
@@ -459,18 +474,17 @@ impl Batch {
     fn fault(
         &self,
         star: &TakenStar<'_>,
-        mt: &HalfEdgeMt,
+        before: Before<'_>,
         margins: &Margins,
         scratch: &mut CodeScratch,
     ) -> Option<Excess> {
         let CodeScratch { parents, beyond, .. } = scratch;
         parents.clear();
         beyond.clear();
-        margins.find_beyond(star.removed(mt), parents, beyond);
+        margins.find_beyond(star.removed(before.mt), parents, beyond);
         let fields = star.levels.len();
-        let error = |UpdateId(u): UpdateId, field: usize| match u.checked_sub(self.first) {
-            Some(i) => self.errors_of(i as usize, fields)[field],
-            None => mt.error_of_field(UpdateId(u), field),
+        let error = |u: UpdateId, field: usize| {
+            self.error(u, field, fields).unwrap_or_else(|| before.error(u, field, fields))
         };
         margins.fault(star.update, parents, beyond, error)
     }
@@ -510,6 +524,22 @@ impl Batch {
             coded.failed.map_or(Ok(()), Err)?;
         }
         Ok(())
+    }
+}
+
+/// The updates before those of a batch.
+#[derive(Clone, Copy)]
+struct Before<'a> {
+    mt: &'a HalfEdgeMt,
+    /// Those that are to be appended later.
+    waiting: &'a [(Batch, CodedBatch)],
+}
+
+impl Before<'_> {
+    /// The error of an update in one of so many fields.
+    fn error(&self, u: UpdateId, field: usize, fields: usize) -> ErrorCode {
+        let waiting = self.waiting.iter().rev().find_map(|(batch, _)| batch.error(u, field, fields));
+        waiting.unwrap_or_else(|| self.mt.error_of_field(u, field))
     }
 }
 

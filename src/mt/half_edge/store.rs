@@ -28,11 +28,10 @@ use crate::mt::error::Result;
 use crate::mt::facts::MtFacts;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::pages::{Page, Pages, Rows};
-use crate::mt::regions::{RegionInfo, Regions, further_regions, measure};
+use crate::mt::regions::{RegionInfo, RegionSums, Regions, further_regions};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
-    BaseMesh, CurrentMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId,
-    VertexId,
+    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId, VertexId,
 };
 
 /// An update whose near vertex is the one that this is stored with.
@@ -316,12 +315,10 @@ impl HalfEdgeMt {
         if is_sound && fits { Ok(()) } else { Err(UpdateError::OffLattice { update: 0 }) }
     }
 
-    /// Finds what is said of the regions in the reference mesh, given that. None if one does not have the tetrahedra that are stated.
-    pub(super) fn measure_regions(&mut self, mesh: &CurrentMesh) -> Option<()> {
+    /// States what has been found of the regions in the reference mesh. None if one does not have the tetrahedra that are stated.
+    pub(super) fn state_regions(&mut self, sums: RegionSums) -> Option<()> {
         let Some(regions) = &mut self.regions else { return Some(()) };
-        let step = self.info.lattice.step;
-        let found = measure(mesh, step, regions.all.len());
-        for (region, found) in regions.all.iter_mut().zip(found) {
+        for (region, found) in regions.all.iter_mut().zip(sums.finish(self.info.lattice.step)) {
             let RegionInfo { tetrahedra, volume, bounds, color, .. } = found;
             (region.volume, region.bounds, region.color) = (volume, bounds, color);
             (region.tetrahedra == tetrahedra).then_some(())?;

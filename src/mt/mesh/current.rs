@@ -215,6 +215,15 @@ impl CurrentMesh {
         Ok(mesh)
     }
 
+    /// Gives the vertices, which are in slots from 0 on, these numbers in the MT.
+    pub(in crate::mt) fn name_vertices(&mut self, vertices: &[u32]) {
+        self.slot_of = PagedArray::new(NONE);
+        for (slot, &vertex) in (0..).zip(vertices) {
+            self.labels[slot as usize].vertex = vertex;
+            self.slot_of.set(vertex, slot);
+        }
+    }
+
     /// Becomes `start`, the base mesh of the same MT. What is known of updates is kept: those that have been applied before
     /// are applied more quickly.
     pub(crate) fn start_again(&mut self, start: Self) {

@@ -30,47 +30,61 @@ pub(crate) struct Appender<'a> {
     number: Vec<u32>,
 }
 
+/// Reference points: their positions, their levels, field by field, and those of their sides behind them.
+type Points<'a> = (&'a [[i32; 3]], &'a [i32], &'a Sides);
+
+/// The builder of an MT with this base mesh and these updates, none of which have been appended, and the MT's vertex for each reference point. The
+/// base tetrahedra of `regions` are in the order of the builder's places.
+pub(crate) fn begin(
+    (info, regions): (MtInfo, Option<Regions>),
+    numbered: Numbered,
+    updates: &Ordered<'_>,
+    (positions, levels, sides): Points<'_>,
+    block_bits: u32,
+) -> Result<(HalfEdgeBuilder, Vec<u32>), BuildError> {
+    let Numbered { mesh, mut number, places } = numbered;
+    let base = mesh.positions.len();
+    for (u, &v) in (0..).zip(updates.vertices) {
+        number[v as usize] = base as u32 + u;
+    }
+    let mut points = vec![NONE; base + updates.vertices.len()];
+    let known = (0..).zip(&number).filter(|(_, v)| **v != NONE);
+    known.for_each(|(point, &v): (u32, _)| points[v as usize] = point);
+    let mut marks = Vec::with_capacity(mesh.tets.len());
+    for (tet, &place) in mesh.tets.iter().zip(&places) {
+        let (remover, inner) = updates.base_marks[place as usize];
+        marks.push(BaseMark { remover, inner: by_corner(inner, tet.map(|v| points[v as usize])) });
+    }
+    let regions = regions.map(|regions| Regions {
+        of_base: places.iter().map(|&place| regions.of_base[place as usize]).collect(),
+        ..regions
+    });
+    let regions = regions.map(|mut regions| {
+        if !sides.is_empty() {
+            regions.sides = base_sides(&mesh, &regions.of_base, &points, (levels, sides));
+        }
+        regions
+    });
+    let near = updates.near.iter().map(|&near| number[near as usize]).collect();
+    let offset = |u: u32| {
+        let [from, to] = [updates.near, updates.vertices].map(|all| positions[all[u as usize] as usize]);
+        [0, 1, 2].map(|k| to[k] - from[k])
+    };
+    let forest = Forest::new(points.len(), near, offset);
+    Ok((HalfEdgeBuilder::new(info, mesh, marks, (forest, points), regions, block_bits)?, number))
+}
+
 impl<'a> Appender<'a> {
-    /// Begins with the base mesh, given the positions and levels of the reference points on their lattices. The base tetrahedra of `regions` are
-    /// in the order of the builder's places.
+    /// [Begins](begin) with the base mesh.
     pub fn new(
-        (info, regions): (MtInfo, Option<Regions>),
+        described: (MtInfo, Option<Regions>),
         numbered: Numbered,
         updates: &Ordered<'_>,
-        (positions, levels, sides): (&[[i32; 3]], &'a [i32], &'a Sides),
+        points: Points<'a>,
         block_bits: u32,
     ) -> Result<Self, BuildError> {
-        let Numbered { mesh, mut number, places } = numbered;
-        let base = mesh.positions.len();
-        for (u, &v) in (0..).zip(updates.vertices) {
-            number[v as usize] = base as u32 + u;
-        }
-        let mut points = vec![NONE; base + updates.vertices.len()];
-        let known = (0..).zip(&number).filter(|(_, v)| **v != NONE);
-        known.for_each(|(point, &v): (u32, _)| points[v as usize] = point);
-        let mut marks = Vec::with_capacity(mesh.tets.len());
-        for (tet, &place) in mesh.tets.iter().zip(&places) {
-            let (remover, inner) = updates.base_marks[place as usize];
-            marks.push(BaseMark { remover, inner: by_corner(inner, tet.map(|v| points[v as usize])) });
-        }
-        let regions = regions.map(|regions| Regions {
-            of_base: places.iter().map(|&place| regions.of_base[place as usize]).collect(),
-            ..regions
-        });
-        let regions = regions.map(|mut regions| {
-            if !sides.is_empty() {
-                regions.sides = base_sides(&mesh, &regions.of_base, &points, (levels, sides));
-            }
-            regions
-        });
-        let near = updates.near.iter().map(|&near| number[near as usize]).collect();
-        let offset = |u: u32| {
-            let [from, to] = [updates.near, updates.vertices].map(|all| positions[all[u as usize] as usize]);
-            [0, 1, 2].map(|k| to[k] - from[k])
-        };
-        let forest = Forest::new(points.len(), near, offset);
-        let builder = HalfEdgeBuilder::new(info, mesh, marks, (forest, points), regions, block_bits)?;
-        Ok(Self { builder, levels, sides, number })
+        let (builder, number) = begin(described, numbered, updates, points, block_bits)?;
+        Ok(Self { builder, levels: points.1, sides: points.2, number })
     }
 
     /// Appends the next update. `star` has for each tetrahedron that it inserts, in the order of their faces opposite the new vertex,

@@ -1,77 +1,67 @@
 //! One MT of the updates of all parts.
 //!
 //! Each node has ordered its own updates into blocks. They are numbered from the last node down to the parts, which extends the partial order, and
-//! appended one by one, as for a whole.
+//! appended in this order, as for a whole. The mesh to which they are applied is never there as a whole: what is left of a node is all that its
+//! own updates remove, a patch.
 
 use super::PartsError;
-use super::piece::{Made, Part, PartUpdates, Remover, RemoverCode, Sided, UpdateRows};
+use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
-use crate::decimate::append::{Appender, Ordered};
+use crate::decimate::append::{self, Ordered};
 use crate::lattice::sides::Sides;
 use crate::order::base::{Numbered, number_base};
-use crate::{BuildProgress, BuildResult, BuildSummary, OnProgress};
+use crate::{BuildError, BuildProgress, BuildResult, BuildSummary, OnProgress};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use tetralod::geom::lattice_box;
 use tetralod::mesh::NONE;
-use tetralod::mt::{ErrorCode, Exact, FieldInfo, VertexId};
+use tetralod::mt::{
+    BaseMark, BaseMesh, ErrorCode, Exact, FieldInfo, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate, Patch,
+    VertexId, by_corner, further_regions,
+};
 
-/// Makes the MT: `whole` is what is left of the last node, and `updates` gives those of every node ([`Plan::nodes`]), each twice. They
-/// are numbered coarse to fine: those of the last node first, those of the parts last, part after part.
+/// Gives what has been made of a node.
+type Of<'a, T> = &'a dyn Fn(Node) -> Result<T, PartsError>;
+
+/// Makes the MT: `left` gives what is left of every node of the plan ([`Plan::nodes`]), that of the last one twice, and `updates` those of every
+/// node, each twice. Updates are numbered coarse to fine: those of the last node first, those of the parts last, part after part.
 ///
 /// # Errors
-/// If `whole` is of another node, or the updates are not those of its plan; those of `updates`; if `progress` stops the work.
+/// If what is given is not of the plan; the errors of `left` and `updates`; if `progress` stops the work.
 pub fn assemble(
-    whole: Part,
-    updates: &dyn Fn(Node) -> Result<PartUpdates, PartsError>,
+    plan: &Plan,
+    left: Of<'_, Part>,
+    updates: Of<'_, PartUpdates>,
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, PartsError> {
-    let Part { head, piece } = whole;
-    let plan = head.plan;
-    if !head.built || !plan.is_whole(head.node) {
-        return Err(PartsError::Damaged { what: "it is not the last one to be joined" });
-    }
-    let points = plan.counts[0] as usize;
-    if piece.points.len() != points {
+    let whole = plan.nodes()[0];
+    let piece = piece_of(plan, whole, left)?;
+    if piece.points.len() != plan.counts[0] as usize {
         return Err(PartsError::Damaged { what: "it lacks points" });
     }
-    let listed = Listed::read(&plan, updates)?;
-    let mut info = plan.info();
-    info.updates = listed.vertices.len() as u32;
-    info.bounds = lattice_box(piece.positions.iter().copied());
-    let level = |(&value, field): (&f64, &FieldInfo)| field.nearest(value);
-    let Sided { first, further, values: of_sides } = piece.sided;
-    let all = piece.values.iter().chain(&of_sides);
-    let levels: Vec<i32> = all.zip(info.fields.iter().cycle()).map(level).collect();
-    let numbered = number_base(&piece.positions, &levels, info.fields.len(), &piece.tets);
-    let summary = BuildSummary::of(&info, &numbered.mesh, 0);
-    listed.check(&numbered)?;
-    let mut base_marks = Vec::with_capacity(piece.tets.len());
-    for (&maker, &inner) in piece.makers.iter().zip(&piece.inner) {
-        let remover = if maker == NONE { NONE } else { listed.numbers.of(piece.earlier[maker as usize])? };
-        base_marks.push((remover, inner));
-    }
-    let ordered = Ordered { vertices: &listed.vertices, near: &listed.near, base_marks: &base_marks };
-    let sides = Sides::new(plan.jumps(), first, further);
-    let reference = (&piece.positions[..], &levels[..], &sides);
-    let unknown = PartsError::Damaged { what: "its tetrahedra are of other regions" };
-    let regions = plan.regions.as_ref().map(|regions| regions.of_base(&piece.regions).ok_or(unknown));
-    let described = (info.clone(), regions.transpose()?);
-    let appender = Appender::new(described, numbered, &ordered, reference, plan.block_bits)?;
-    let Listed { numbers, vertices, .. } = listed;
-    let depths = vec![1; vertices.len()];
-    drop(vertices);
-    // Of the piece only the exact values may still be needed.
-    let values = piece.values;
-    let values = if plan.fields.iter().any(|field| field.lossless) { values } else { Vec::new() };
-    let mut assembly = Assembly { appender, numbers, depths, fields: info.fields.len(), done: 0 };
-    assembly.append_all(&plan, updates, progress)?;
-    let depth = assembly.depths.into_iter().max().unwrap_or(0);
-    let (mt, vertices) = assembly.appender.finish()?;
-    let exact = exact(&plan, &values, &vertices);
+    let (assembly, values, summary) = Assembly::begin(plan, piece, updates)?;
+    let (mt, number, depth) = assembly.append_all((left, updates), progress)?;
+    let vertices: Vec<VertexId> = number.into_iter().map(VertexId).collect();
+    let exact = exact(plan, &values, &vertices);
     let summary = BuildSummary { depth, ..summary };
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
+
+/// What is left of a node.
+fn piece_of(plan: &Plan, node: Node, left: Of<'_, Part>) -> Result<Piece, PartsError> {
+    let Part { head, piece } = left(node)?;
+    if head.plan != *plan || head.node != node || !head.built {
+        return Err(PartsError::OtherPlan);
+    }
+    let tets = piece.tets.len();
+    if [piece.makers.len(), piece.inner.len()] != [tets; 2] {
+        return Err(PartsError::Damaged { what: "its tetrahedra lack marks" });
+    }
+    Ok(piece)
+}
+
+/// What is wrong where tetrahedra have regions that the plan does not have.
+const OTHER_REGIONS: &str = "its tetrahedra are of other regions";
 
 /// The numbers of updates in the MT: level by level, and of each level first the whole blocks of its nodes, node after node, then what
 /// is left over of each. So the blocks of the file are those into which each node has ordered its updates, but for the first node of
@@ -113,6 +103,11 @@ impl Numbers {
 
     fn span(&self, node: Node) -> Result<Span, PartsError> {
         self.of_node.get(&node).copied().ok_or(PartsError::OtherPlan)
+    }
+
+    /// The number of the update that removes what a maker of a piece has made; [`NONE`] for what is of the reference mesh.
+    fn of_maker(&self, maker: u32, piece: &Piece) -> Result<u32, PartsError> {
+        if maker == NONE { Ok(NONE) } else { self.of(piece.earlier[maker as usize]) }
     }
 
     /// The number of an update.
@@ -187,62 +182,191 @@ impl Listed {
     }
 }
 
+/// Reference vertices with their levels: vertex by vertex and field by field, and behind these those of their sides.
+struct Vertices {
+    levels: Vec<i32>,
+    sides: Sides,
+}
+
+impl Vertices {
+    /// Those of a piece, whose values it gives.
+    fn of(plan: &Plan, info: &MtInfo, piece: &mut Piece) -> Self {
+        let Sided { first, further, values: of_sides } = std::mem::take(&mut piece.sided);
+        let level = |(&value, field): (&f64, &FieldInfo)| field.nearest(value);
+        let all = piece.values.iter().chain(&of_sides);
+        Self {
+            levels: all.zip(info.fields.iter().cycle()).map(level).collect(),
+            sides: Sides::new(plan.jumps(), first, further),
+        }
+    }
+
+    /// The levels of a vertex, or of one of its sides.
+    fn levels(&self, point: u32, fields: usize) -> &[i32] {
+        &self.levels[point as usize * fields..][..fields]
+    }
+
+    /// The levels of a vertex in its further regions.
+    fn further(&self, v: u32, fields: usize) -> Vec<(u16, &[i32])> {
+        self.sides.further(v).map(|(side, region)| (region as u16, self.levels(side, fields))).collect()
+    }
+}
+
 /// An MT to which updates are appended.
 struct Assembly<'a> {
-    appender: Appender<'a>,
+    plan: &'a Plan,
+    info: MtInfo,
+    builder: HalfEdgeBuilder,
+    /// The MT's vertex for each reference vertex.
+    number: Vec<u32>,
     numbers: Numbers,
     /// For each update the longest chain of updates that leads to it.
     depths: Vec<u32>,
-    fields: usize,
     done: usize,
 }
 
-impl Assembly<'_> {
+impl<'a> Assembly<'a> {
+    /// With the base mesh, which is what is left of the whole. Returns the exact values, if some are to be kept, and what is known of the MT.
+    fn begin(
+        plan: &'a Plan,
+        mut piece: Piece,
+        updates: Of<'_, PartUpdates>,
+    ) -> Result<(Self, Vec<f64>, BuildSummary), PartsError> {
+        let listed = Listed::read(plan, updates)?;
+        let mut info = plan.info();
+        info.updates = listed.vertices.len() as u32;
+        info.bounds = lattice_box(piece.positions.iter().copied());
+        let vertices = Vertices::of(plan, &info, &mut piece);
+        let numbered = number_base(&piece.positions, &vertices.levels, info.fields.len(), &piece.tets);
+        let summary = BuildSummary::of(&info, &numbered.mesh, 0);
+        listed.check(&numbered)?;
+        let mut base_marks = Vec::with_capacity(piece.tets.len());
+        for (&maker, &inner) in piece.makers.iter().zip(&piece.inner) {
+            base_marks.push((listed.numbers.of_maker(maker, &piece)?, inner));
+        }
+        let ordered = Ordered { vertices: &listed.vertices, near: &listed.near, base_marks: &base_marks };
+        let points = (&piece.positions[..], &vertices.levels[..], &vertices.sides);
+        let unknown = PartsError::Damaged { what: OTHER_REGIONS };
+        let regions = plan.regions.as_ref().map(|regions| regions.of_base(&piece.regions).ok_or(unknown));
+        let described = (info.clone(), regions.transpose()?);
+        let (builder, number) = append::begin(described, numbered, &ordered, points, plan.block_bits)?;
+        let depths = vec![1; listed.vertices.len()];
+        let is_lossless = plan.fields.iter().any(|field| field.lossless);
+        let values = if is_lossless { piece.values } else { Vec::new() };
+        Ok((Self { plan, info, builder, number, numbers: listed.numbers, depths, done: 0 }, values, summary))
+    }
+
+    /// Returns the MT, its vertex for each reference vertex, and the length of the longest chain of updates.
     fn append_all(
+        mut self,
+        (left, updates): (Of<'_, Part>, Of<'_, PartUpdates>),
+        progress: OnProgress<'_>,
+    ) -> Result<(HalfEdgeMt, Vec<u32>, u32), PartsError> {
+        for level in self.plan.nodes().chunk_by(|a, b| a.level == b.level) {
+            for &node in level {
+                let piece = piece_of(self.plan, node, left)?;
+                self.append_node(node, piece, updates(node)?.rows, progress)?;
+            }
+            self.builder.append_waiting().map_err(BuildError::from)?;
+        }
+        let depth = self.depths.into_iter().max().unwrap_or(0);
+        Ok((self.builder.finish().map_err(BuildError::from)?, self.number, depth))
+    }
+
+    /// Appends the updates of a node to what is left of it: those that are left over from blocks come behind those of the other nodes of its level.
+    fn append_node(
         &mut self,
-        plan: &Plan,
-        updates: &dyn Fn(Node) -> Result<PartUpdates, PartsError>,
+        node: Node,
+        mut piece: Piece,
+        rows: UpdateRows,
         progress: OnProgress<'_>,
     ) -> Result<(), PartsError> {
-        for level in plan.nodes().chunk_by(|a, b| a.level == b.level) {
-            let mut left_over = Vec::new();
-            for &node in level {
-                let rows = updates(node)?.rows;
-                let Span { count, in_blocks, .. } = self.numbers.span(node)?;
-                if rows.vertices.len() != count as usize {
-                    return Err(PartsError::OtherPlan);
-                }
-                let (in_blocks, rest) = rows.split(in_blocks as usize, self.fields);
-                self.append(node, &in_blocks, progress)?;
-                left_over.push((node, rest));
-            }
-            for (node, rows) in left_over {
-                self.append(node, &rows, progress)?;
-            }
+        let Span { count, first, in_blocks, rest } = self.numbers.span(node)?;
+        if rows.vertices.len() != count as usize {
+            return Err(PartsError::OtherPlan);
         }
+        let vertices = Vertices::of(self.plan, &self.info, &mut piece);
+        let patch = self.patch(&piece, &vertices)?;
+        self.builder.start_patch(&patch).map_err(BuildError::from)?;
+        drop(patch);
+        let reference = (&piece.points[..], &vertices);
+        let (in_blocks, left_over) = rows.split(in_blocks as usize, self.info.fields.len());
+        self.append(node, first, &in_blocks, reference, progress)?;
+        if !left_over.vertices.is_empty() {
+            self.builder.continue_later(rest).map_err(BuildError::from)?;
+            self.append(node, rest, &left_over, reference, progress)?;
+        }
+        self.builder.end_patch(node.level == 0).map_err(BuildError::from)?;
         Ok(())
     }
 
-    /// Appends updates of a node, which come next.
-    fn append(&mut self, node: Node, rows: &UpdateRows, progress: OnProgress<'_>) -> Result<(), PartsError> {
-        let Self { appender, numbers, depths, fields, done } = self;
+    /// What is left of a node, as the MT knows it.
+    fn patch(&self, piece: &Piece, vertices: &Vertices) -> Result<Patch, PartsError> {
+        let fields = self.info.fields.len();
+        let mut used: Vec<u32> = piece.tets.iter().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        let mut place = vec![NONE; piece.points.len()];
+        (0..).zip(&used).for_each(|(at, &v)| place[v as usize] = at);
+        let tets: Vec<[u32; 4]> = piece.tets.iter().map(|tet| tet.map(|v| place[v as usize])).collect();
+        let mut marks = Vec::with_capacity(tets.len());
+        for ((&maker, &inner), &tet) in piece.makers.iter().zip(&piece.inner).zip(&piece.tets) {
+            let remover = self.numbers.of_maker(maker, piece)?;
+            marks.push(BaseMark { remover, inner: by_corner(inner, tet) });
+        }
+        let number = |&region: &u32| u16::try_from(region).ok();
+        let regions: Option<Vec<u16>> = piece.regions.iter().map(number).collect();
+        let regions = regions.ok_or(PartsError::Damaged { what: OTHER_REGIONS })?;
+        let mut values: Vec<i32> = used.iter().flat_map(|&v| vertices.levels(v, fields)).copied().collect();
+        let mut side_levels = Vec::new();
+        if !vertices.sides.is_empty() {
+            let at =
+                |v: u32, region: u16| vertices.levels(vertices.sides.point(v, u32::from(region)), fields);
+            let mut first = vec![u16::MAX; used.len()];
+            for (tet, &region) in tets.iter().zip(&regions) {
+                tet.iter().for_each(|&v| first[v as usize] = region.min(first[v as usize]));
+            }
+            // What is the first region in the whole may have no tetrahedra here.
+            values = used.iter().zip(first).flat_map(|(&v, region)| at(v, region)).copied().collect();
+            let further = further_regions(used.len(), &tets, &regions).into_iter();
+            side_levels = further.flat_map(|(v, region)| at(used[v as usize], region)).copied().collect();
+        }
+        let positions = used.iter().map(|&v| piece.positions[v as usize]).collect();
+        let vertices = used.iter().map(|&v| self.number[piece.points[v as usize] as usize]).collect();
+        Ok(Patch { mesh: BaseMesh { positions, values, tets }, vertices, marks, regions, side_levels })
+    }
+
+    /// Appends updates of a node, numbered from `first` on, given its reference vertices, which ascend.
+    fn append(
+        &mut self,
+        node: Node,
+        first: u32,
+        rows: &UpdateRows,
+        (points, vertices): (&[u32], &Vertices),
+        progress: OnProgress<'_>,
+    ) -> Result<(), PartsError> {
+        let Self { builder, numbers, depths, done, info, .. } = self;
         let earlier = rows.earlier.iter().map(|&made| numbers.of(made)).collect::<Result<Vec<u32>, _>>()?;
-        let own = numbers.span(node)?;
+        let (own, fields) = (numbers.span(node)?, info.fields.len());
         let mut star = 0;
-        for (i, errors) in rows.errors.chunks(*fields).enumerate() {
+        for (i, (number, errors)) in (first as usize..).zip(rows.errors.chunks(fields)).enumerate() {
             BuildProgress::tell_ordered(*done, depths.len(), progress)?;
             let inserted: Range<usize> = star..star + usize::from(rows.stars[i]);
             let removers = rows.removers[inserted.clone()].iter().map(|&code| remover(code, own, &earlier));
             for below in removers.clone().filter(|&remover| remover != NONE) {
-                let depth = depths[*done] + 1;
+                let depth = depths[number] + 1;
                 match depths.get_mut(below as usize) {
-                    Some(of_child) if below as usize > *done => *of_child = (*of_child).max(depth),
+                    Some(of_child) if below as usize > number => *of_child = (*of_child).max(depth),
                     _ => return Err(PartsError::Damaged { what: "its updates are out of order" }),
                 }
             }
             let errors: Vec<ErrorCode> = errors.iter().copied().map(ErrorCode).collect();
             let inner = rows.inner[inserted.clone()].iter().copied();
-            appender.push(rows.vertices[i], &errors, removers.zip(inner))?;
+            let unknown = PartsError::Damaged { what: "its updates are those of other points" };
+            let vertex = points.binary_search(&rows.vertices[i]).map_err(|_| unknown)? as u32;
+            let sides = vertices.further(vertex, fields);
+            let levels = vertices.levels(vertex, fields);
+            let next = NextUpdate { levels, sides: &sides, errors: &errors, faces: &[] };
+            builder.push(&next, removers.zip(inner)).map_err(BuildError::from)?;
             star = inserted.end;
             *done += 1;
         }

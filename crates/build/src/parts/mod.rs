@@ -64,16 +64,14 @@
 //! })?;
 //! assert_eq!(plan.levels(), [2, 1]);
 //! let mut go_on = |_| ControlFlow::Continue(());
-//! let (mut left, mut updates) = (Vec::new(), Vec::new());
+//! let mut made = Vec::new();
 //! for part in parted {
-//!     let (part, of_part) = parts::build_part(part, &mut go_on)?;
-//!     left.push(part);
-//!     updates.push(of_part);
+//!     made.push(parts::build_part(part, &mut go_on)?);
 //! }
-//! let (whole, last) = parts::join(Node { level: 1, index: 0 }, left, &mut go_on)?;
-//! updates.push(last);
-//! let of = |node| Ok(updates.iter().find(|of| of.node() == node).cloned().unwrap());
-//! let built = parts::assemble(whole, &of, &mut go_on)?;
+//! let of_parts = made.iter().map(|(left, _)| left.clone()).collect();
+//! made.push(parts::join(Node { level: 1, index: 0 }, of_parts, &mut go_on)?);
+//! let of = |node| made.iter().find(|(left, _)| left.node() == node).cloned().unwrap();
+//! let built = parts::assemble(&plan, &|node| Ok(of(node).0), &|node| Ok(of(node).1), &mut go_on)?;
 //! assert_eq!(built.summary.tetrahedra, 6 * 8 * 8 * 8);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -60,9 +60,12 @@ impl Files {
         PartUpdates::read(&mut Cursor::new(&self.built[&node]))
     }
 
+    fn left(&self, node: Node) -> Result<Part, PartsError> {
+        read(&self.built[&node])
+    }
+
     fn assemble(&self, plan: &Plan) -> BuildResult {
-        let whole = read(&self.built[&plan.nodes()[0]]).expect("the last part");
-        parts::assemble(whole, &|node| self.updates(node), &mut go_on).expect("an MT")
+        parts::assemble(plan, &|node| self.left(node), &|node| self.updates(node), &mut go_on).expect("an MT")
     }
 }
 
@@ -339,10 +342,10 @@ fn damaged_parts_are_refused() {
             assert!(!same, "flipped at {at}");
         }
     }
-    // Updates that are missing are told, not made up.
-    let whole = read(&files.built[&top]).expect("the last part");
-    let missing = |_| files.updates(top);
-    assert!(parts::assemble(whole, &missing, &mut go_on).is_err());
+    // What is missing is told, not made up.
+    let (left, updates) = (|node| files.left(node), |node| files.updates(node));
+    assert!(parts::assemble(&plan, &left, &|_| files.updates(top), &mut go_on).is_err());
+    assert!(parts::assemble(&plan, &|_| files.left(top), &updates, &mut go_on).is_err());
     let mt: Mt = files.assemble(&plan).mt;
     assert_eq!(mt.info().vertices, 125);
 }
