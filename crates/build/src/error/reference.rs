@@ -52,10 +52,11 @@ pub(crate) struct Reference<'a> {
     pub quantized: &'a Quantized,
     pub points: u32,
     pub boundary: BoundaryDistance,
-    /// Model units of displacement of the boundary that count as an error of 1, at each vertex of the reference mesh.
-    allowances: Vec<f64>,
-    /// The most of them.
+    /// For each vertex of the reference mesh the square of the shortest edge there.
+    pub shortest: Vec<f64>,
+    /// Model units of displacement of the boundary that count as an error of 1 at most, and as a multiple of the shortest edge there.
     pub displacement_per_error: f64,
+    edges: f64,
 }
 
 impl<'a> Reference<'a> {
@@ -74,24 +75,20 @@ impl<'a> Reference<'a> {
         shortest: Vec<f64>,
         (displacement_per_error, edges): (f64, f64),
     ) -> Self {
+        Self { quantized, points: shortest.len() as u32, boundary, shortest, displacement_per_error, edges }
+    }
+
+    /// The displacement that counts as an error of 1 at a vertex.
+    fn allowance(&self, vertex: u32) -> f64 {
         // With no displacement allowed any movement is an infinite error.
-        let allowance = |squared: f64| {
-            let own = if edges > 0.0 { edges * squared.sqrt() } else { 0.0 };
-            own.min(displacement_per_error)
-        };
-        Self {
-            quantized,
-            points: shortest.len() as u32,
-            boundary,
-            allowances: shortest.into_iter().map(allowance).collect(),
-            displacement_per_error,
-        }
+        let own = if self.edges > 0.0 { self.edges * self.shortest[vertex as usize].sqrt() } else { 0.0 };
+        own.min(self.displacement_per_error)
     }
 
     /// What a displacement at a reference vertex counts as.
     pub fn error_at(&self, point: u32, distance: f64) -> f64 {
         let vertex = self.quantized.vertex(point);
-        if distance > 0.0 { distance / self.allowances[vertex as usize] } else { 0.0 }
+        if distance > 0.0 { distance / self.allowance(vertex) } else { 0.0 }
     }
 
     /// What a displacement from a triangle of the reference boundary counts as.
@@ -119,7 +116,7 @@ impl<'a> Reference<'a> {
     pub fn allowance_from(&self, triangle: u32) -> f64 {
         self.boundary
             .corners(triangle)
-            .map(|point| self.allowances[point as usize])
+            .map(|point| self.allowance(point))
             .into_iter()
             .fold(f64::INFINITY, f64::min)
     }

@@ -22,6 +22,7 @@ use crate::restrict::restrictions::Restrictions;
 use crate::{BuildError, BuildProgress, OnProgress};
 use glam::DVec3;
 use std::collections::BTreeMap;
+use std::mem::take;
 use std::sync::Arc;
 use tetralod::mesh::{NONE, Topology, boundary_faces, growth_order, topology};
 use tetralod::mt::{ErrorCode, MtInfo};
@@ -74,25 +75,29 @@ pub fn join(
 }
 
 /// Simplifies a piece.
-fn run(head: Head, piece: Piece, progress: OnProgress<'_>) -> Result<(Part, PartUpdates), PartsError> {
+fn run(head: Head, mut piece: Piece, progress: OnProgress<'_>) -> Result<(Part, PartUpdates), PartsError> {
     let Head { plan, node, .. } = head;
     let info = plan.info();
-    let quantized = quantized(&plan, &info, &piece);
+    let before = piece.tets.len();
+    let quantized = quantized(&plan, &info, &mut piece);
     let topology = topology(piece.points.len(), &piece.tets).map_err(BuildError::from)?;
-    let state = state(&plan, node, (&piece, topology), &quantized)?;
     let earlier: Vec<ErrorCode> = piece.earlier_errors.iter().copied().map(ErrorCode).collect();
-    let inner = if piece.inner.is_empty() { vec![0; piece.tets.len()] } else { piece.inner.clone() };
+    let inner = take(&mut piece.inner);
+    let inner = if inner.is_empty() { vec![0; before] } else { inner };
+    let state = state(&plan, node, (&mut piece, topology), &quantized)?;
     let of_piece = MtInfo { vertices: piece.points.len() as u32, ..info };
     let mut record = Collapses::resume(&of_piece, earlier, inner);
-    let left = piece.tets.len().div_ceil(LEFT).max(LEFT_AT_INTERFACE * piece.interface.len());
+    let left = before.div_ceil(LEFT).max(LEFT_AT_INTERFACE * piece.interface.len());
     let enough = if plan.is_whole(node) { 0 } else { left as u32 };
     let mut decimator = Decimator::new(state, None, &mut record);
-    decimator.remove_until(enough, &mut |now| progress(of_step(now, piece.tets.len(), enough)))?;
-    let Decimator { state, record: finished, .. } = decimator;
+    decimator.remove_until(enough, &mut |now| progress(of_step(now, before, enough)))?;
+    let Decimator { mut state, record: finished, .. } = decimator;
     finished.finish(&state.mesh.tets, &state.removals.makers);
     let places = Left::of(&state.mesh.tets);
-    let left = what_is_left(&piece, &state, &places);
+    let left = what_is_left(&mut state, &places);
     drop(state);
+    piece.positions = quantized.positions.to_vec();
+    drop(quantized);
     let head = Head { plan, node, built: true };
     Ok(sorted_out(head, (piece, left), record))
 }
@@ -107,15 +112,15 @@ fn of_step(now: BuildProgress, before: usize, enough: u32) -> BuildProgress {
     BuildProgress { done, total, ..now }
 }
 
-/// The reference vertices of a piece on the lattices of the whole.
-fn quantized(plan: &Plan, info: &MtInfo, piece: &Piece) -> Quantized {
+/// The reference vertices of a piece, whose positions it takes, on the lattices of the whole.
+fn quantized(plan: &Plan, info: &MtInfo, piece: &mut Piece) -> Quantized {
     let fields = &info.fields;
+    let positions: Arc<[[i32; 3]]> = take(&mut piece.positions).into();
     let Sided { first, further, values } = &piece.sided;
     let per_value = || piece.values.iter().chain(values).zip(fields.iter().cycle());
-    let positions: Arc<[[i32; 3]]> = piece.positions.as_slice().into();
     let place = |point: usize| match piece.moved.binary_search_by_key(&(point as u32), |(v, _)| *v) {
         Ok(at) => DVec3::from_array(piece.moved[at].1),
-        Err(_) => as_vec(piece.positions[point]),
+        Err(_) => as_vec(positions[point]),
     };
     Quantized {
         lattice: info.lattice,
@@ -131,11 +136,11 @@ fn quantized(plan: &Plan, info: &MtInfo, piece: &Piece) -> Quantized {
     }
 }
 
-/// The state of the builder in which a piece is.
+/// The state of the builder in which a piece is, of which it takes what changes.
 fn state<'a>(
     plan: &Plan,
     node: Node,
-    (piece, topology): (&Piece, Topology),
+    (piece, topology): (&mut Piece, Topology),
     quantized: &'a Quantized,
 ) -> Result<State<'a>, PartsError> {
     let Topology { mut neighbors, non_manifold, .. } = topology;
@@ -144,38 +149,38 @@ fn state<'a>(
     let is_reference = node.level == 0;
     let boundary = match is_reference {
         true => boundary_faces(&piece.tets, &neighbors).map(|(_, face)| face).collect(),
-        false => piece.boundary.clone(),
+        false => take(&mut piece.boundary),
     };
     let boundary = BoundaryDistance::of(boundary, &quantized.scaled());
     let of_errors = (plan.displacement_per_error, plan.displacement_edges);
-    let reference = Reference::of(quantized, boundary, piece.shortest.clone(), of_errors);
+    let reference = Reference::of(quantized, boundary, take(&mut piece.shortest), of_errors);
     let mut open = vec![false; points];
     piece.shared.iter().for_each(|&(v, ..)| open[v as usize] = true);
     let frozen = non_manifold.iter().zip(&open).map(|(a, b)| a | b).collect();
     let mut buckets = Buckets::new(piece.tets.len(), quantized);
-    piece.inside.iter().for_each(|&(v, t)| buckets.inside.put(t, v));
-    piece.border.iter().for_each(|&(v, t)| buckets.border.put(t, v));
-    piece.outside.iter().for_each(|&v| buckets.outside_points.set_outside(v, true));
-    piece.foreign.iter().for_each(|&(v, t)| buckets.outside_points.add_foreign(t, v));
+    take(&mut piece.inside).into_iter().for_each(|(v, t)| buckets.inside.put(t, v));
+    take(&mut piece.border).into_iter().for_each(|(v, t)| buckets.border.put(t, v));
+    take(&mut piece.outside).into_iter().for_each(|v| buckets.outside_points.set_outside(v, true));
+    take(&mut piece.foreign).into_iter().for_each(|(v, t)| buckets.outside_points.add_foreign(t, v));
     let mut removals = Removals::new(piece.tets.len());
     if !piece.makers.is_empty() {
-        removals.makers.clone_from(&piece.makers);
+        removals.makers = take(&mut piece.makers);
     }
-    removals.errors = piece.earlier_errors.iter().copied().map(ErrorCode).collect();
+    removals.errors = take(&mut piece.earlier_errors).into_iter().map(ErrorCode).collect();
     let mut reaches = match is_reference {
         true => reach::of_stars(&piece.tets, &quantized.positions),
         false => vec![Reach::default(); points],
     };
-    for (v, ends) in &piece.reaches {
-        ends.iter().for_each(|&p| reaches[*v as usize].add(p));
+    for (v, ends) in take(&mut piece.reaches) {
+        ends.iter().for_each(|&p| reaches[v as usize].add(p));
     }
-    let mesh = WorkMesh::new(piece.tets.clone(), neighbors, points);
+    let mesh = WorkMesh::new(take(&mut piece.tets), neighbors, points);
     let history = History { buckets, removals, reaches };
     let state = State::resume(mesh, reference, frozen, Levels::of_purpose(plan.purpose()), history);
     let mut kept = vec![false; if piece.kept.is_empty() { 0 } else { points }];
     piece.kept.iter().for_each(|&v| kept[v as usize] = true);
     let restrictions = Restrictions::of_angles(&plan.restricting(), quantized)?;
-    let restrictions = restrictions.with(piece.regions.clone(), kept);
+    let restrictions = restrictions.with(take(&mut piece.regions), kept);
     Ok(State { open, restrictions, ..state })
 }
 
@@ -218,14 +223,15 @@ impl Left {
     }
 }
 
-/// What is left of a piece, but for what follows from the record.
-fn what_is_left(piece: &Piece, state: &State<'_>, places: &Left) -> Piece {
-    let State { mesh, buckets, reference, reaches, .. } = state;
+/// What is left of a piece of what the state has taken, but for what follows from the record.
+fn what_is_left(state: &mut State<'_>, places: &Left) -> Piece {
+    let shortest = take(&mut state.reference.shortest);
+    let State { mesh, buckets, reference, reaches, .. } = &*state;
     let inside = places.pairs(|t| buckets.inside.iter(t));
     let is_outside = |v: &u32| buckets.outside_points.is_outside(*v);
     let mut outside: Vec<u32> = inside.iter().map(|(v, _)| *v).filter(is_outside).collect();
     outside.sort_unstable();
-    let left = (0..piece.points.len() as u32).filter(|&v| mesh.has(v));
+    let left = (0..reference.points).filter(|&v| mesh.has(v));
     let regions = state.restrictions.regions();
     let live = if regions.is_empty() { &[][..] } else { &places.live };
     Piece {
@@ -236,6 +242,7 @@ fn what_is_left(piece: &Piece, state: &State<'_>, places: &Left) -> Piece {
         reaches: left.map(|v| (v, reaches[v as usize].ends())).collect(),
         inside,
         outside,
+        shortest,
         ..Piece::default()
     }
 }
@@ -296,7 +303,6 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
         points: piece.points,
         positions: piece.positions,
         values: piece.values,
-        shortest: piece.shortest,
         moved: piece.moved,
         shared: piece.shared,
         interface: piece.interface,
@@ -308,12 +314,17 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
 }
 
 /// The pieces of a node as one.
-fn joined(plan: &Plan, node: Node, pieces: Vec<Piece>) -> Piece {
+fn joined(plan: &Plan, node: Node, mut pieces: Vec<Piece>) -> Piece {
     let mut all = Piece::over(pieces.iter().map(|piece| &piece.points), plan.fields.len());
     let own = plan.parts_of(node);
     let is_open = |&(_, first, last): &(u32, u32, u32)| !own.contains(&first) || !own.contains(&last);
-    let put = |piece: &Piece| all.put(&piece.points, &piece.positions, &piece.values, &piece.shortest);
-    let mut numbers: Vec<Vec<u32>> = pieces.iter().map(put).collect();
+    // What has been put is freed before the next is touched: never is all there twice.
+    let put = |piece: &mut Piece| {
+        let (positions, values, shortest) =
+            (take(&mut piece.positions), take(&mut piece.values), take(&mut piece.shortest));
+        all.put(&piece.points, &positions, &values, &shortest)
+    };
+    let mut numbers: Vec<Vec<u32>> = pieces.iter_mut().map(put).collect();
     all.sided = Sided::joined(&pieces, all.points.len(), plan.fields.len(), &mut numbers);
     for (piece, numbers) in pieces.into_iter().zip(numbers) {
         let number = |v: u32| numbers[v as usize];

@@ -6,7 +6,7 @@
 
 use super::PartsError;
 use super::plan::{Node, Plan};
-use super::wire::{read_frame, read_magic, skip_frame, write_frame, write_magic};
+use super::wire::{read_frame, read_magic, read_numbers, skip_frame, write_frame, write_magic};
 use crate::lattice::sides::Sides;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -298,7 +298,7 @@ impl Part {
         if head.built {
             skip_frame(input)?;
         }
-        let piece: Piece = read_frame(input)?;
+        let piece: Piece = read_numbers(input)?;
         let part = Self { head, piece };
         part.check().map_err(|what| PartsError::Damaged { what })?;
         Ok(part)
@@ -408,7 +408,7 @@ impl PartUpdates {
         if !head.built {
             return Err(PartsError::Damaged { what: "it has not been built" });
         }
-        let rows: UpdateRows = read_frame(input)?;
+        let rows: UpdateRows = read_numbers(input)?;
         let updates = Self { head, rows };
         updates.check().map_err(|what| PartsError::Damaged { what })?;
         Ok(updates)

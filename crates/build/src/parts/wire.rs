@@ -3,7 +3,7 @@
 use super::PartsError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 
 /// How each file begins; the last byte is the version.
 const MAGIC: [u8; 8] = *b"mtparts\x05";
@@ -25,12 +25,82 @@ pub fn read_magic(input: &mut dyn Read) -> Result<(), PartsError> {
     }
 }
 
+/// Passes bytes on, counts them, and takes their checksum.
+struct Summed<T> {
+    inner: T,
+    len: u64,
+    hasher: crc32fast::Hasher,
+}
+
+impl<T> Summed<T> {
+    fn new(inner: T) -> Self {
+        Self { inner, len: 0, hasher: crc32fast::Hasher::new() }
+    }
+
+    fn note(&mut self, bytes: &[u8]) {
+        self.len += bytes.len() as u64;
+        self.hasher.update(bytes);
+    }
+
+    fn sums(self) -> (u64, u32) {
+        (self.len, self.hasher.finalize())
+    }
+}
+
+impl<T: Write> Write for Summed<T> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let len = self.inner.write(bytes)?;
+        self.note(&bytes[..len]);
+        Ok(len)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+impl<T: Read> Read for Summed<T> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let len = self.inner.read(bytes)?;
+        self.note(&bytes[..len]);
+        Ok(len)
+    }
+}
+
+/// The value is serialised twice, at first for its length and checksum alone: its bytes are never there as a whole.
 pub fn write_frame<T: Serialize>(out: &mut dyn Write, value: &T) -> Result<(), PartsError> {
-    let payload =
-        postcard::to_stdvec(value).map_err(|_| PartsError::Damaged { what: "it cannot be written" })?;
-    out.write_all(&(payload.len() as u64).to_le_bytes())?;
-    out.write_all(&crc32fast::hash(&payload).to_le_bytes())?;
-    Ok(out.write_all(&payload)?)
+    let unwritten = |_| PartsError::Damaged { what: "it cannot be written" };
+    let counted = postcard::to_io(value, BufWriter::new(Summed::new(io::sink()))).map_err(unwritten)?;
+    let counted = counted.into_inner().map_err(|error| error.into_error())?;
+    let (len, crc) = counted.sums();
+    out.write_all(&len.to_le_bytes())?;
+    out.write_all(&crc.to_le_bytes())?;
+    let mut out = Kept { out: BufWriter::new(out), failed: None };
+    let written = postcard::to_io(value, &mut out).map(drop).map_err(unwritten);
+    match out.failed {
+        Some(error) => Err(error.into()),
+        None => written.and_then(|()| Ok(out.out.flush()?)),
+    }
+}
+
+/// Keeps why it failed: `postcard` does not tell.
+struct Kept<W> {
+    out: W,
+    failed: Option<io::Error>,
+}
+
+impl<W: Write> Write for Kept<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes).map_err(|error| {
+            let kind = error.kind();
+            self.failed = Some(error);
+            kind.into()
+        })
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }
 
 /// The length and the checksum of the next frame.
@@ -43,17 +113,40 @@ fn read_head(input: &mut dyn Read) -> Result<(u64, u32), PartsError> {
     Ok((len, crc))
 }
 
+/// Reads a value that may hold text.
 pub fn read_frame<T: DeserializeOwned>(input: &mut dyn Read) -> Result<T, PartsError> {
+    read_by(input, |frame| {
+        let mut payload = Vec::new();
+        frame.read_to_end(&mut payload)?;
+        Ok(postcard::from_bytes(&payload).ok())
+    })
+}
+
+/// Reads a value of numbers alone: its bytes are never there as a whole.
+pub fn read_numbers<T: DeserializeOwned>(input: &mut dyn Read) -> Result<T, PartsError> {
+    read_by(input, |frame| {
+        let value = postcard::from_io((&mut *frame, &mut [])).ok().map(|(value, _)| value);
+        io::copy(frame, &mut io::sink())?;
+        Ok(value)
+    })
+}
+
+/// Reads a value by `read`, which reads its frame to the end.
+fn read_by<T>(
+    input: &mut dyn Read,
+    read: impl FnOnce(&mut BufReader<Summed<io::Take<&mut dyn Read>>>) -> io::Result<Option<T>>,
+) -> Result<T, PartsError> {
     let (len, crc) = read_head(input)?;
-    let mut payload = Vec::new();
-    input.take(len).read_to_end(&mut payload)?;
-    if payload.len() as u64 != len {
+    let mut frame = BufReader::new(Summed::new(input.take(len)));
+    let value = read(&mut frame)?;
+    let (found_len, found_crc) = frame.into_inner().sums();
+    if found_len != len {
         return Err(PartsError::Damaged { what: "it is cut off" });
     }
-    if crc32fast::hash(&payload) != crc {
+    if found_crc != crc {
         return Err(PartsError::Damaged { what: "its checksum is another one" });
     }
-    postcard::from_bytes(&payload).map_err(|_| PartsError::Damaged { what: "its content is another one" })
+    value.ok_or(PartsError::Damaged { what: "its content is another one" })
 }
 
 /// Skips a frame.
