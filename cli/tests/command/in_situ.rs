@@ -113,7 +113,7 @@ fn a_damaged_piece_is_named() {
     let piece = simulation.piece(1);
     let whole = fs::read(&piece).expect("a piece");
     simulation.ask();
-    let work = ["work", &simulation.dir, "--retries", "0"];
+    let work = ["work", &simulation.dir, "--retries", "0", "--quiet"];
     fs::write(&piece, &whole[..whole.len() / 2]).expect("a file");
     bad(1, &work, &["part the mesh has failed 1 times", "piece-1.vtu", "--retry-failed` goes on"]);
     fs::write(&piece, &whole).expect("a file");
