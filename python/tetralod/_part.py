@@ -38,6 +38,7 @@ def part_write(
     >>> tetralod.part_write(folder.name, 1, [*corner[1:], [1, 1, 1]], [[0, 1, 2, 3]], {"p": [1, 2, 3, 4]})
     >>> tetralod.build(f"{folder.name}/pieces.pvtu").info.tetrahedra
     2
+    >>> folder.cleanup()
     """
     number = _options.whole("rank", rank, 0, _MOST_RANKS)
     _write(Path(folder) / f"piece-{number}.vtu", _vtu.piece(points, tets, point_data or {}))
