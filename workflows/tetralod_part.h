@@ -181,7 +181,8 @@ static inline int tetralod_check_(int rank, const tetralod_part *part, char *mes
     for (i = 0; i < 4 * part->tets; i++) {
         const int64_t point = is_narrow ? narrow[i] : wide[i];
         if (point < 0 || point >= part->points) {
-            snprintf(message, size, "tetrahedron %" PRId64 " of rank %d has point %" PRId64 ", and there are %" PRId64, i / 4, rank, point, part->points);
+            snprintf(message, size, "tetrahedron %" PRId64 " of rank %d has point %" PRId64 ", and there are %" PRId64, i / 4, rank, point,
+                     part->points);
             return TETRALOD_BAD_ARGUMENT;
         }
     }
@@ -202,7 +203,7 @@ static inline void tetralod_write_part_(tetralod_file_ *file, const tetralod_par
     uint64_t i, bytes;
     int f;
     fprintf(file->out,
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"2.2\" byte_order=\"%s\" header_type=\"UInt64\">\n"
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"%s\" header_type=\"UInt64\">\n"
             "<UnstructuredGrid>\n<Piece NumberOfPoints=\"%" PRIu64 "\" NumberOfCells=\"%" PRIu64 "\">\n<PointData>\n",
             tetralod_byte_order_(), points, tets);
     for (f = 0; f < part->fields; f++) {
@@ -257,7 +258,7 @@ static inline int tetralod_part_list(const char *folder, int ranks, const tetral
     result = tetralod_open_(&file, folder, "pieces.pvtu");
     if (result == TETRALOD_OK) {
         fprintf(file.out,
-                "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"2.2\" byte_order=\"%s\" header_type=\"UInt64\">\n"
+                "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"%s\" header_type=\"UInt64\">\n"
                 "<PUnstructuredGrid GhostLevel=\"0\">\n<PPointData>\n",
                 tetralod_byte_order_());
         for (i = 0; i < fields; i++) {

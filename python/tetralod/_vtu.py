@@ -56,7 +56,8 @@ def encoded(points: Any, cells: Any, point_data: Mapping[str, Any], cell_data: M
     ]
     if any(faces is not None for *_, faces, _ in blocks):
         of_cells += _faces(file, blocks)
-    return b"".join(file.whole((len(places), sum(counts)), at_points, at_cells, file.array("Points", places), of_cells))
+    counted, at = (len(places), sum(counts)), file.array("Points", places)
+    return b"".join(file.whole("2.2", counted, at_points, at_cells, at, of_cells))
 
 
 def piece(points: Any, tets: Any, point_data: Mapping[str, Any]) -> list[Any]:
@@ -78,7 +79,8 @@ def piece(points: Any, tets: Any, point_data: Mapping[str, Any]) -> list[Any]:
         file.array("offsets", np.arange(4, 4 * len(cells) + 1, 4, dtype=np.int64)),
         file.array("types", np.full(len(cells), NUMBERS["tetra"], dtype=np.uint8)),
     ]
-    return file.whole((len(places), len(cells)), at_points, [], at, of_cells)
+    # The version that all programs read.
+    return file.whole("1.0", (len(places), len(cells)), at_points, [], at, of_cells)
 
 
 def pieces(count: int, point_data: Mapping[str, Any]) -> bytes:
@@ -87,7 +89,7 @@ def pieces(count: int, point_data: Mapping[str, Any]) -> bytes:
     arrays = [f"{_element('PDataArray', name, _field(name, values, len(values)))}/>\n" for name, values in named]
     sources = [f'<Piece Source="piece-{rank}.vtu"/>\n' for rank in range(count)]
     return (
-        '<?xml version="1.0"?>\n<VTKFile type="PUnstructuredGrid" version="2.2" byte_order="LittleEndian" header_type="UInt64">\n'
+        '<?xml version="1.0"?>\n<VTKFile type="PUnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
         f'<PUnstructuredGrid GhostLevel="0">\n<PPointData>\n{"".join(arrays)}</PPointData>\n'
         f"<PPoints>\n{_element('PDataArray', 'Points', np.zeros((0, 3)))}/>\n</PPoints>\n"
         f"{''.join(sources)}</PUnstructuredGrid>\n</VTKFile>\n"
@@ -110,11 +112,17 @@ class _File:
         return f'{_element("DataArray", name, values)} format="appended" offset="{offset}"/>\n'
 
     def whole(
-        self, counts: tuple[int, int], at_points: Sequence[str], at_cells: Sequence[str], points: str, cells: Sequence[str]
+        self,
+        version: str,
+        counts: tuple[int, int],
+        at_points: Sequence[str],
+        at_cells: Sequence[str],
+        points: str,
+        cells: Sequence[str],
     ) -> list[Any]:
-        """The file, in parts, with the elements of its arrays."""
+        """The file, in parts, with the elements of its arrays. Before version 2.1 some cells have another order of points."""
         head = (
-            '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="2.2" byte_order="LittleEndian" header_type="UInt64">\n'
+            f'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="{version}" byte_order="LittleEndian" header_type="UInt64">\n'
             f'<UnstructuredGrid>\n<Piece NumberOfPoints="{counts[0]}" NumberOfCells="{counts[1]}">\n'
             f"<PointData>\n{''.join(at_points)}</PointData>\n<CellData>\n{''.join(at_cells)}</CellData>\n"
             f"<Points>\n{points}</Points>\n<Cells>\n{''.join(cells)}</Cells>\n"

@@ -6,6 +6,8 @@ use crate::support::{Folder, bad, command, good, json, text};
 use std::fs;
 use std::process::{Child, Command, Stdio};
 
+const EXAMPLE: &str = "examples/in-situ/simulation.c";
+
 /// How many ranks the simulation has.
 const RANKS: usize = 3;
 
@@ -23,7 +25,7 @@ impl Simulation {
         let folder = Folder::new(name);
         let [program, pieces, list, dir] =
             ["simulation", "step", "step/pieces.pvtu", "dir"].map(|name| folder.path(name));
-        compile("cc", &["-std=c99"], &program);
+        compile("cc", &["-std=c99"], EXAMPLE, &program);
         fs::create_dir(&pieces).expect("a folder");
         Self { folder, program, pieces, list, dir }
     }
@@ -56,10 +58,10 @@ impl Simulation {
     }
 }
 
-fn compile(compiler: &str, options: &[&str], program: &str) {
+fn compile(compiler: &str, options: &[&str], source: &str, program: &str) {
     let mut command = Command::new(compiler);
     command.args(options).args(["-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I", "workflows"]);
-    let output = command.args(["examples/in-situ/simulation.c", "-o", program]).current_dir(root()).output();
+    let output = command.args([source, "-o", program]).current_dir(root()).output();
     let output = output.unwrap_or_else(|error| panic!("{compiler}: {error}"));
     assert!(output.status.success(), "{compiler}: {}", text(&output.stderr));
 }
@@ -147,7 +149,7 @@ fn what_cannot_be_done_later_is_refused_at_once() {
 fn the_header_writes_the_same_in_c_and_in_cpp() {
     let simulation = Simulation::new("in-situ-header");
     let [program, pieces] = ["other", "other-step"].map(|name| simulation.folder.path(name));
-    compile("c++", &["-x", "c++", "-std=c++11"], &program);
+    compile("c++", &["-x", "c++", "-std=c++11"], EXAMPLE, &program);
     fs::create_dir(&pieces).expect("a folder");
     let ranks = RANKS.to_string();
     simulate(&simulation.program, &[&simulation.pieces, &ranks]);
@@ -159,9 +161,51 @@ fn the_header_writes_the_same_in_c_and_in_cpp() {
         let [c, cpp] = [&simulation.pieces, &pieces].map(|folder| fs::read(format!("{folder}/{name}")));
         assert!(c.expect("a file") == cpp.expect("a file"), "{name}");
     }
-    let output = Command::new(&program).args([&simulation.folder.path("nowhere"), &ranks]).output();
-    let output = output.expect("the simulation starts");
-    assert_eq!(output.status.code(), Some(2));
-    let said = text(&output.stderr);
-    assert!(said.contains("nowhere/pieces.pvtu could not be written: No such file"), "{said}");
+}
+
+/// Writes what is wrong, and says what comes of it.
+const WRONG: &str = r#"
+#include "tetralod_part.h"
+int main(void) {
+    const double points[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, values[4] = {0, 1, 2, 3};
+    const int64_t right[4] = {0, 1, 2, 3}, high[4] = {0, 1, 2, 4}, low[4] = {0, -1, 2, 3};
+    const int64_t *tets[] = {high, low, right, right, right, right, right};
+    const char *names[] = {"a", "a", "", "b\n", "a", "a", "<\"a\">"};
+    const int components[] = {1, 1, 1, 1, 0, 1, 1};
+    int i;
+    for (i = 0; i < 7; i++) {
+        tetralod_field field = {"", 1, TETRALOD_FLOAT64, NULL};
+        tetralod_part part = {4, points, 1, TETRALOD_INT64, NULL, 1, NULL};
+        char message[200] = "";
+        int result;
+        field.name = names[i];
+        field.components = components[i];
+        field.values = i == 5 ? NULL : values;
+        part.tets_points = tets[i];
+        part.field = &field;
+        result = tetralod_part_write(i < 6 ? "." : "nowhere", 7, &part, message, sizeof message);
+        printf("%d %s\n", result, message);
+    }
+    return 0;
+}
+"#;
+
+#[test]
+fn the_header_says_what_is_wrong() {
+    let folder = Folder::new("in-situ-wrong");
+    let [source, program] = ["wrong.c", "wrong"].map(|name| folder.path(name));
+    fs::write(&source, WRONG).expect("a file");
+    compile("cc", &["-std=c99"], &source, &program);
+    let output = Command::new(&program).current_dir(folder.path("")).output().expect("it starts");
+    let said = [
+        "1 tetrahedron 0 of rank 7 has point 4, and there are 4",
+        "1 tetrahedron 0 of rank 7 has point -1, and there are 4",
+        "1 field 0 must have a name, a type, and at least one component",
+        "1 the name of field 0 has a control character",
+        "1 field 0 must have a name, a type, and at least one component",
+        "1 field 0 has no values",
+        "2 nowhere/piece-7.vtu could not be written: No such file or directory",
+    ];
+    assert_eq!(text(&output.stdout).lines().collect::<Vec<_>>(), said);
+    assert_eq!(folder.names(), ["wrong", "wrong.c"], "nothing is written");
 }
