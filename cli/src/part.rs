@@ -98,7 +98,7 @@ pub fn part_now(folder: &Path) -> Result<()> {
     let mut arguments = Arguments::from_arg_matches(&matches)?;
     // As others may see the folder in another place.
     arguments.output = folder;
-    arguments.verbosity = Verbosity { quiet: true, ..Verbosity::default() };
+    arguments.verbosity = Verbosity::default();
     let there = || format!("{}, where `tetralod part --later` was given", request.directory.display());
     std::env::set_current_dir(&request.directory).with_context(there)?;
     // The notes are of the workers that wait for it.

@@ -165,7 +165,10 @@ impl Worker<'_> {
             }
             if let Some(pieces) = self.tasks.pieces()?.filter(|pieces| !pieces.are_there()) {
                 let (words, folder) = (pieces.words(), self.arguments.folder.display());
-                ensure!(self.arguments.wait, "{words}. `tetralod work {folder} --wait` waits for them");
+                ensure!(
+                    self.arguments.wait,
+                    "{words}. `tetralod work {folder} --wait` waits until all are there"
+                );
                 self.bar.set_message(format!("wait for {} pieces", pieces.missing()));
                 std::thread::sleep(pause);
                 pause = (2 * pause).min(PATIENCE);
@@ -250,18 +253,23 @@ impl Worker<'_> {
         let memory = peak_memory.map_or("memory not known".to_owned(), output::bytes);
         let costs = format!("{:.2} s, {memory}", done.seconds);
         self.report.peak_memory = self.report.peak_memory.max(peak_memory);
+        let mut said = || -> Result<String> {
+            let mut said = Vec::new();
+            stderr.rewind()?;
+            stderr.read_to_end(&mut said)?;
+            Ok(String::from_utf8_lossy(&said).into_owned())
+        };
         let words = if status.success() {
             self.tasks.note_done(task, &done)?;
             self.report.tasks += 1;
             self.done.insert(task);
-            format!("{name}: {costs}")
+            // What was found and mended of a mesh, before the rest.
+            let notes = said()?;
+            format!("{notes}{name}: {costs}")
         } else if status.code() == Some(files::INTERRUPTED) {
             files::interrupt();
         } else {
-            let mut said = Vec::new();
-            stderr.rewind()?;
-            stderr.read_to_end(&mut said)?;
-            let error = output::failure(&String::from_utf8_lossy(&said), status);
+            let error = output::failure(&said()?, status);
             let words = format!("{name} failed: {error} ({costs})");
             self.report.failures += 1;
             self.tasks.note_failure(task, &Failed { error, tries: retries.saturating_add(1), done })?;

@@ -2,7 +2,7 @@
 //! process makes; what is missing or damaged is named.
 
 use crate::readme::root;
-use crate::support::{Folder, bad, command, good, json, text};
+use crate::support::{Folder, bad, command, good, json, run, text};
 use std::fs;
 use std::process::{Child, Command, Stdio};
 
@@ -77,7 +77,7 @@ fn workers_wait_for_pieces() {
     let Simulation { dir, list, .. } = &simulation;
     simulation.ask();
     let missing = |words: &[&str]| bad(1, &["work", dir], words);
-    missing(&["pieces.pvtu is not there yet", "--wait` waits for them"]);
+    missing(&["pieces.pvtu is not there yet", "--wait` waits until all are there"]);
     let mut workers = [simulation.start(), simulation.start()];
     simulation.run_rank(2);
     simulation.run_rank(0);
@@ -121,6 +121,17 @@ fn a_damaged_piece_is_named() {
     fs::write(&piece, &whole).expect("a file");
     good(&["work", &simulation.dir, "--retry-failed"]);
     simulation.assert_built();
+    // What is mended is told by the worker that parts the mesh.
+    fs::remove_dir_all(&simulation.dir).expect("a folder");
+    simulation.ask();
+    fs::copy(simulation.piece(2), &piece).expect("a file");
+    let output = run(&["work", &simulation.dir]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let said = text(&output.stderr);
+    assert!(
+        said.contains("dropped 1152 duplicate tetrahedra\n") && said.contains("\npart the mesh: "),
+        "{said}"
+    );
     // A list of something else.
     fs::write(&simulation.list, "<VTKFile").expect("a file");
     let ask = ["part", &simulation.list, "--parts", "4", "-o", &simulation.dir, "--later"];
