@@ -91,7 +91,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, again: &[OsString]) ->
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let subcommand = arguments.get(1).map(|word| word.to_string_lossy().into_owned());
     usage::define(Arguments::command, subcommand.unwrap_or_default());
-    match run_command(Arguments::parse_from(arguments).command, again) {
+    match run_command(
+        Arguments::parse_from(&arguments).command,
+        arguments.get(2..).unwrap_or_default(),
+        again,
+    ) {
         Ok(code) => code,
         Err(error) => {
             output::note_error(&error);
@@ -100,7 +104,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, again: &[OsString]) ->
     }
 }
 
-fn run_command(command: Command, again: &[OsString]) -> anyhow::Result<u8> {
+/// Runs a subcommand, whose arguments `words` were.
+fn run_command(command: Command, words: &[OsString], again: &[OsString]) -> anyhow::Result<u8> {
     // Serving has a handler of its own for Ctrl-C; there can be only one.
     if !matches!(command, Command::Serve(_) | Command::View(_)) {
         files::remove_partial_output_on_interrupt()?;
@@ -108,7 +113,7 @@ fn run_command(command: Command, again: &[OsString]) -> anyhow::Result<u8> {
     match command {
         Command::Generate(arguments) => generate::run(&arguments)?,
         Command::Build(arguments) => build::run(&arguments)?,
-        Command::Part(arguments) => part::run(&arguments)?,
+        Command::Part(arguments) => part::run(&arguments, words)?,
         Command::Join(arguments) => join::run(&arguments)?,
         Command::Work(arguments) => work::run(&arguments, again)?,
         Command::Status(arguments) => status::run(&arguments)?,

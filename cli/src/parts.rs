@@ -4,7 +4,7 @@ use super::files;
 use super::output::{self, Verbosity};
 use super::progress::{progress_bar, with_progress};
 use super::remedies::failed;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -130,13 +130,7 @@ impl Folder<'_> {
         };
         let file: PlanFile = serde_json::from_slice(&text)
             .with_context(|| format!("{} is no plan of this version; part the mesh again", path.display()))?;
-        if file.version != VERSION {
-            let version = file.version;
-            bail!(
-                "{folder} was written by tetralod {version}, and this is {VERSION}, which may build other bytes: take tetralod {version}, or part \
-                 the mesh again by this one"
-            );
-        }
+        check_version(self.0, &file.version)?;
         read(&self.parted(0), "`tetralod part`", |file| Plan::read(file))
     }
 
@@ -258,6 +252,17 @@ impl Folder<'_> {
         let step = if of.level == 0 { "`tetralod build --part`" } else { "`tetralod join --node`" };
         read(&self.built(of), step, |file| Plan::read(file))
     }
+}
+
+/// Refuses what another version has written, or was asked.
+pub fn check_version(folder: &Path, version: &str) -> Result<()> {
+    ensure!(
+        version == VERSION,
+        "{} was written by tetralod {version}, and this is {VERSION}, which may build other bytes: take tetralod {version}, or part the mesh \
+         again by this one",
+        folder.display()
+    );
+    Ok(())
 }
 
 /// Reads a file that another step has made.

@@ -2,6 +2,7 @@
 
 use super::output;
 use super::work::lease::{self, Holder};
+use super::work::request::Awaited;
 use super::work::tasks::{Done, Failed, Files, Tasks};
 use anyhow::{Context, Result};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -35,8 +36,10 @@ struct Status {
     folder: String,
     /// The MT file, if it is there.
     file: Option<String>,
-    /// Whether there is something that workers can do.
+    /// Whether there is something that workers can do, now or when pieces are there.
     goes_on: bool,
+    /// The pieces of a mesh that is to be parted later.
+    pieces: Option<Awaited>,
     levels: Vec<Level>,
     running: Vec<Running>,
     failed: Vec<FailedTask>,
@@ -106,7 +109,7 @@ enum State {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let tasks = Tasks::of(&arguments.folder)?;
+    let mut tasks = Tasks::of(&arguments.folder)?;
     if !arguments.watch {
         let status = Status::of(arguments, &tasks)?;
         return output::result(arguments.json, &status, &status.rows());
@@ -133,6 +136,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if is_last {
             return Ok(());
         }
+        if !tasks.are_planned() {
+            tasks = Tasks::of(&arguments.folder)?;
+        }
         // Looking takes a tenth of the time at most.
         std::thread::sleep(LOOK.max(10 * start.elapsed()));
     }
@@ -145,8 +151,9 @@ impl Status {
         let file = tasks.result(last);
         let mut status = Self {
             folder: arguments.folder.display().to_string(),
-            file: files.has_result(&file).then(|| file.display().to_string()),
+            file: (tasks.are_planned() && files.has_result(&file)).then(|| file.display().to_string()),
             goes_on: false,
+            pieces: tasks.pieces()?,
             levels: tasks.levels().iter().map(|&tasks| Level { tasks, ..Level::default() }).collect(),
             running: Vec::new(),
             failed: Vec::new(),
@@ -162,10 +169,13 @@ impl Status {
                 State::Open => (),
             }
         }
-        status.goes_on =
-            status.file.is_none() && !tasks.open(&done, |task| failed.contains(&task)).ready.is_empty();
+        let has_ready = || !tasks.open(&done, |task| failed.contains(&task)).ready.is_empty();
+        // With the plan come other tasks.
+        let is_parted_just_now = !tasks.are_planned() && done.contains(&last);
+        status.goes_on = is_parted_just_now || status.file.is_none() && has_ready();
         for (level, number) in status.levels.iter_mut().zip(0..) {
             level.what = match number {
+                _ if !tasks.are_planned() => "part".to_owned(),
                 0 => "build".to_owned(),
                 _ if number == last.level => "file".to_owned(),
                 _ => format!("join {number}"),
@@ -229,11 +239,13 @@ impl Status {
     fn key(&self) -> Vec<u32> {
         let of_level = |level: &Level| [level.done, level.running, level.failed];
         let failures = self.failed.iter().map(|task| task.times);
-        self.levels.iter().flat_map(of_level).chain(failures).collect()
+        let missing = self.pieces.iter().map(|pieces| pieces.missing() as u32);
+        self.levels.iter().flat_map(of_level).chain(failures).chain(missing).collect()
     }
 
     fn rows(&self) -> Vec<(String, String)> {
         let mut rows = vec![("folder".to_owned(), self.folder.clone())];
+        rows.extend(self.pieces.iter().map(|pieces| ("pieces".to_owned(), pieces.words())));
         rows.extend(self.levels.iter().map(|level| (level.what.clone(), level.words(self.file.as_ref()))));
         rows.extend(self.running.iter().map(|task| ("running".to_owned(), task.words())));
         rows.extend(self.failed.iter().map(|task| ("failed".to_owned(), task.words())));

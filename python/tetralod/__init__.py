@@ -20,6 +20,7 @@ from ._errors import TetralodError
 from ._info import Field, Info, Region, Regions, VectorPart
 from ._mesh import FieldStats, Lines, Mesh, RefineStats, Surface
 from ._mt import Mt, open
+from ._part import part_list, part_write
 from ._show import show
 
 __all__ = [
@@ -37,5 +38,7 @@ __all__ = [
     "VectorPart",
     "build",
     "open",
+    "part_list",
+    "part_write",
     "show",
 ]

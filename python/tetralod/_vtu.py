@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ NUMBERS = {
     "VTK_BEZIER_HEXAHEDRON": 79, "VTK_BEZIER_WEDGE": 80, "VTK_BEZIER_PYRAMID": 81,
 }  # fmt: skip
 
+# What XML would take for the end of an attribute, or for a space.
+_QUOTED = {'"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
+
 # meshio turns the triangles of linear wedges around.
 _ORDERS = {"wedge": [0, 2, 1, 3, 5, 4]}
 
@@ -40,9 +43,7 @@ def encoded(points: Any, cells: Any, point_data: Mapping[str, Any], cell_data: M
     blocks = [_block(kind, listed) for kind, listed in _blocks(cells)]
     counts = [len(lengths) for _, _, lengths, _, _ in blocks]
     file = _File()
-    at_points = [
-        file.array(name, _values(f"point_data[{name!r}]", values, len(places))) for name, values in point_data.items()
-    ]
+    at_points = [file.array(name, _field(name, values, len(places))) for name, values in point_data.items()]
     at_cells = [
         file.array(name, _values(f"cell_data[{name!r}]", _joined(values, counts), sum(counts)))
         for name, values in cell_data.items()
@@ -55,14 +56,44 @@ def encoded(points: Any, cells: Any, point_data: Mapping[str, Any], cell_data: M
     ]
     if any(faces is not None for *_, faces, _ in blocks):
         of_cells += _faces(file, blocks)
-    head = (
-        '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="2.2" byte_order="LittleEndian" header_type="UInt64">\n'
-        f'<UnstructuredGrid>\n<Piece NumberOfPoints="{len(places)}" NumberOfCells="{sum(counts)}">\n'
-        f"<PointData>\n{''.join(at_points)}</PointData>\n<CellData>\n{''.join(at_cells)}</CellData>\n"
-        f"<Points>\n{file.array('Points', places)}</Points>\n<Cells>\n{''.join(of_cells)}</Cells>\n"
-        '</Piece>\n</UnstructuredGrid>\n<AppendedData encoding="raw">\n_'
-    )
-    return b"".join([head.encode(), *file.parts, b"\n</AppendedData>\n</VTKFile>\n"])
+    counted, at = (len(places), sum(counts)), file.array("Points", places)
+    return b"".join(file.whole("2.2", counted, at_points, at_cells, at, of_cells))
+
+
+def piece(points: Any, tets: Any, point_data: Mapping[str, Any]) -> list[Any]:
+    """The file of tetrahedra alone, in parts: byte for byte that of `workflows/tetralod_part.h`."""
+    places = _options.numbers("points", points, (None, 3), "an array of shape (n, 3)")
+    cells = np.asarray(tets)
+    if cells.ndim != 2 or cells.shape[1] != 4 or cells.dtype.kind not in "iu":
+        raise bad_option("tets", f"must be an array of integers of shape (m, 4), not {cells.dtype} of shape {cells.shape}")
+    outside = np.flatnonzero((cells < 0) | (cells >= len(places)))
+    if outside.size:
+        first = int(outside[0])
+        raise bad_option("tets", f"tetrahedron {first // 4} has point {cells.flat[first]}, and there are {len(places)}")
+    cells = cells if cells.dtype == np.int32 else cells.astype(np.int64, copy=False)
+    file = _File()
+    at_points = [file.array(name, _field(name, values, len(places))) for name, values in point_data.items()]
+    at = file.array("Points", places)
+    of_cells = [
+        file.array("connectivity", cells.ravel()),
+        file.array("offsets", np.arange(4, 4 * len(cells) + 1, 4, dtype=np.int64)),
+        file.array("types", np.full(len(cells), NUMBERS["tetra"], dtype=np.uint8)),
+    ]
+    # The version that all programs read.
+    return file.whole("1.0", (len(places), len(cells)), at_points, [], at, of_cells)
+
+
+def pieces(count: int, point_data: Mapping[str, Any]) -> bytes:
+    """The list of so many pieces, `piece-0.vtu` and so on."""
+    named = [(name, np.atleast_1d(values)) for name, values in point_data.items()]
+    arrays = [f"{_element('PDataArray', name, _field(name, values, len(values)))}/>\n" for name, values in named]
+    sources = [f'<Piece Source="piece-{rank}.vtu"/>\n' for rank in range(count)]
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="PUnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+        f'<PUnstructuredGrid GhostLevel="0">\n<PPointData>\n{"".join(arrays)}</PPointData>\n'
+        f"<PPoints>\n{_element('PDataArray', 'Points', np.zeros((0, 3)))}/>\n</PPoints>\n"
+        f"{''.join(sources)}</PUnstructuredGrid>\n</VTKFile>\n"
+    ).encode()
 
 
 class _File:
@@ -75,15 +106,36 @@ class _File:
     def array(self, name: str, values: NDArray[Any]) -> str:
         """Appends an array; returns its element."""
         values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
-        kind = {"i": "Int", "u": "UInt", "f": "Float"}[values.dtype.kind] + str(8 * values.dtype.itemsize)
-        components = values.shape[1] if values.ndim == 2 else 1
         offset = self.bytes
-        self.parts += [values.nbytes.to_bytes(8, "little"), values.tobytes()]
+        self.parts += [values.nbytes.to_bytes(8, "little"), values.data]
         self.bytes += 8 + values.nbytes
-        return (
-            f'<DataArray type="{kind}" Name={quoteattr(name)} NumberOfComponents="{components}" '
-            f'format="appended" offset="{offset}"/>\n'
+        return f'{_element("DataArray", name, values)} format="appended" offset="{offset}"/>\n'
+
+    def whole(
+        self,
+        version: str,
+        counts: tuple[int, int],
+        at_points: Sequence[str],
+        at_cells: Sequence[str],
+        points: str,
+        cells: Sequence[str],
+    ) -> list[Any]:
+        """The file, in parts, with the elements of its arrays. Before version 2.1 some cells have another order of points."""
+        head = (
+            f'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="{version}" byte_order="LittleEndian" header_type="UInt64">\n'
+            f'<UnstructuredGrid>\n<Piece NumberOfPoints="{counts[0]}" NumberOfCells="{counts[1]}">\n'
+            f"<PointData>\n{''.join(at_points)}</PointData>\n<CellData>\n{''.join(at_cells)}</CellData>\n"
+            f"<Points>\n{points}</Points>\n<Cells>\n{''.join(cells)}</Cells>\n"
+            '</Piece>\n</UnstructuredGrid>\n<AppendedData encoding="raw">\n_'
         )
+        return [head.encode(), *self.parts, b"\n</AppendedData>\n</VTKFile>\n"]
+
+
+def _element(element: str, name: str, values: NDArray[Any]) -> str:
+    """The beginning of the element of an array."""
+    kind = {"i": "Int", "u": "UInt", "f": "Float"}[values.dtype.kind] + str(8 * values.dtype.itemsize)
+    components = values.shape[1] if values.ndim == 2 else 1
+    return f'<{element} type="{kind}" Name="{escape(name, _QUOTED)}" NumberOfComponents="{components}"'
 
 
 def _blocks(cells: Any) -> list[tuple[Any, Any]]:
@@ -171,6 +223,10 @@ def _joined(values: Any, counts: list[int]) -> Any:
     if is_list and [len(one) if np.ndim(one) > 0 else -1 for one in values] == counts:
         return np.concatenate([np.asarray(one) for one in values])
     return values
+
+
+def _field(name: str, values: Any, count: int) -> NDArray[Any]:
+    return _values(f"point_data[{name!r}]", values, count)
 
 
 def _values(name: str, values: Any, count: int) -> NDArray[Any]:

@@ -52,6 +52,11 @@ const ELSEWHERE = {
     "dockerfile: needs a registry",
   ],
   "docs/howto/deformed.md": ["sh: the commands of movies.md are run"],
+  "docs/howto/in-situ.md": [
+    "c: cli/tests/command/in_situ.rs compiles the example",
+    "python: python/tests/test_part.py runs the example",
+    "sh: cli/tests/command/in_situ.rs",
+  ],
   "docs/howto/movies.md": ["sh: needs ffmpeg"],
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
   "docs/howto/one-file.md": ["sh: cli/tests/command/html.rs and html-browser.test.js make such pages; the command here is without the viewer"],

@@ -1,14 +1,15 @@
 //! `tetralod work`: builds what has been parted, together with other processes that do the same.
 
 pub mod lease;
+pub mod request;
 pub mod tasks;
 
 use self::lease::{Lease, Leases};
 use self::tasks::{Done, Failed, Files, Tasks};
 use super::output::{self, Verbosity};
 use super::progress::progress_bar;
-use super::{files, join, machine, parse, parts};
-use anyhow::{Context, Result, bail};
+use super::{files, join, machine, parse, part, parts};
+use anyhow::{Context, Result, bail, ensure};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -36,12 +37,18 @@ pub struct Arguments {
     /// Try again what has failed too often, when its cause is gone.
     #[arg(long)]
     retry_failed: bool,
+    /// Wait for the pieces of a mesh that is to be parted later, instead of ending if some are missing.
+    #[arg(long)]
+    wait: bool,
     /// After how many seconds without a heartbeat of this worker others may take its task; it has six in that time.
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = parse::parse_positive)]
     stale_after: f64,
     /// Do one task, as long as the standard input is open: what a worker starts for each.
     #[arg(long, value_name = "L/K", value_parser = parts::node, hide = true)]
     task: Option<Node>,
+    /// The same for the task of parting a mesh.
+    #[arg(long, hide = true)]
+    parting: bool,
     #[command(flatten)]
     verbosity: Verbosity,
 }
@@ -50,7 +57,7 @@ pub struct Arguments {
 const SHORT: Duration = Duration::from_millis(1);
 const LONG: Duration = Duration::from_millis(50);
 
-/// How long is waited for other workers at most.
+/// How long is waited for other workers, or for pieces, at most.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The summary as programs get it.
@@ -70,7 +77,7 @@ struct Report {
 /// One worker.
 struct Worker<'a> {
     arguments: &'a Arguments,
-    tasks: &'a Tasks,
+    tasks: Tasks,
     /// The program, with its first arguments.
     again: &'a [OsString],
     leases: Leases,
@@ -84,22 +91,21 @@ pub fn run(arguments: &Arguments, again: &[OsString]) -> Result<()> {
     let start = Instant::now();
     let Arguments { folder, threads, stale_after, verbosity, .. } = arguments;
     let tasks = Tasks::of(folder)?;
-    if let Some(task) = arguments.task {
+    if arguments.parting || arguments.task.is_some() {
         end_with_the_worker();
         machine::set_threads(*threads)?;
-        return perform(folder, &tasks, task);
+        return arguments.task.map_or_else(|| part::part_now(folder), |task| perform(folder, &tasks, task));
     }
     tasks.make_place()?;
     if arguments.retry_failed {
         tasks.forget_failures()?;
     }
-    let all_tasks: u32 = tasks.levels().iter().sum();
     let bar = progress_bar(verbosity, "{pos}/{len}  ")?;
-    bar.set_length(all_tasks.into());
-    let file = tasks.result(tasks.last()).display().to_string();
-    let report = Report { file, tasks: 0, all_tasks, failures: 0, peak_memory: None, seconds: 0.0 };
-    let (tasks, leases, done) = (&tasks, Leases::new(*stale_after), BTreeSet::new());
+    let report =
+        Report { file: String::new(), tasks: 0, all_tasks: 0, failures: 0, peak_memory: None, seconds: 0.0 };
+    let (leases, done) = (Leases::new(*stale_after), BTreeSet::new());
     let mut worker = Worker { arguments, tasks, again, leases, done, report, bar };
+    worker.begin();
     worker.work()?;
     worker.bar.finish_and_clear();
     let report = Report { seconds: start.elapsed().as_secs_f64(), ..worker.report };
@@ -134,6 +140,14 @@ fn perform(folder: &PathBuf, tasks: &Tasks, task: Node) -> Result<()> {
 }
 
 impl Worker<'_> {
+    /// Counts the tasks that are known now.
+    fn begin(&mut self) {
+        let count: u32 = self.tasks.levels().iter().sum();
+        self.bar.set_length(count.into());
+        self.report.all_tasks += count;
+        self.report.file = self.tasks.result(self.tasks.last()).display().to_string();
+    }
+
     /// Works until the file is there.
     fn work(&mut self) -> Result<()> {
         let mut pause = SHORT;
@@ -141,7 +155,24 @@ impl Worker<'_> {
             let files = self.tasks.files()?;
             self.look(&files)?;
             if self.done.contains(&self.tasks.last()) {
-                return Ok(());
+                if self.tasks.are_planned() {
+                    return Ok(());
+                }
+                self.tasks = Tasks::of(&self.arguments.folder)?;
+                self.done.clear();
+                self.begin();
+                continue;
+            }
+            if let Some(pieces) = self.tasks.pieces()?.filter(|pieces| !pieces.are_there()) {
+                let (words, folder) = (pieces.words(), self.arguments.folder.display());
+                ensure!(
+                    self.arguments.wait,
+                    "{words}. `tetralod work {folder} --wait` waits until all are there"
+                );
+                self.bar.set_message(format!("wait for {} pieces", pieces.missing()));
+                std::thread::sleep(pause);
+                pause = (2 * pause).min(PATIENCE);
+                continue;
             }
             if let Some((task, lease)) = self.take(&files)? {
                 self.perform_apart(task, lease)?;
@@ -181,7 +212,7 @@ impl Worker<'_> {
         // What has failed is left to others, as they may have more memory, while there is something else.
         ready.sort_by_key(|&task| tries(task));
         for task in ready {
-            let Some(lease) = self.leases.take(self.tasks, task)? else { continue };
+            let Some(lease) = self.leases.take(&self.tasks, task)? else { continue };
             // It may have been done since the files were looked at.
             if !self.tasks.is_done(task)? {
                 return Ok(Some((task, lease)));
@@ -200,7 +231,11 @@ impl Worker<'_> {
         let (program, first) = self.again.split_first().context("no program")?;
         let mut command = Command::new(program);
         command.args(first).arg("work").arg(folder);
-        command.arg(format!("--task={}/{}", task.level, task.index));
+        if self.tasks.are_planned() {
+            command.arg(format!("--task={}/{}", task.level, task.index));
+        } else {
+            command.arg("--parting");
+        }
         command.args(threads.map(|threads| format!("--threads={threads}")));
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(stderr.try_clone()?);
         let mut child = command.spawn().with_context(|| format!("{name} could not be started"))?;
@@ -218,18 +253,23 @@ impl Worker<'_> {
         let memory = peak_memory.map_or("memory not known".to_owned(), output::bytes);
         let costs = format!("{:.2} s, {memory}", done.seconds);
         self.report.peak_memory = self.report.peak_memory.max(peak_memory);
+        let mut said = || -> Result<String> {
+            let mut said = Vec::new();
+            stderr.rewind()?;
+            stderr.read_to_end(&mut said)?;
+            Ok(String::from_utf8_lossy(&said).into_owned())
+        };
         let words = if status.success() {
             self.tasks.note_done(task, &done)?;
             self.report.tasks += 1;
             self.done.insert(task);
-            format!("{name}: {costs}")
+            // What was found and mended of a mesh, before the rest.
+            let notes = said()?;
+            format!("{notes}{name}: {costs}")
         } else if status.code() == Some(files::INTERRUPTED) {
             files::interrupt();
         } else {
-            let mut said = Vec::new();
-            stderr.rewind()?;
-            stderr.read_to_end(&mut said)?;
-            let error = output::failure(&String::from_utf8_lossy(&said), status);
+            let error = output::failure(&said()?, status);
             let words = format!("{name} failed: {error} ({costs})");
             self.report.failures += 1;
             self.tasks.note_failure(task, &Failed { error, tries: retries.saturating_add(1), done })?;

@@ -1,8 +1,9 @@
 //! The tasks of a folder of parts: a step for each node, the last of which writes the MT file; which are done, and what workers have written
-//! down of them.
+//! down of them. Where a mesh is to be parted later, that is one task, before all others are known.
 
+use super::request::{Awaited, REQUEST, Request};
 use crate::files;
-use crate::parts::{Folder, command_for};
+use crate::parts::{Folder, PLAN, command_for};
 use anyhow::{Context, Result, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -22,9 +23,16 @@ const FILE: &str = "built.mt";
 /// What is to be done in a folder. A task has the level and the number of the node that it makes; that which writes the file is above all.
 pub struct Tasks {
     folder: PathBuf,
-    plan: Plan,
+    known: Known,
     /// How many tasks each level has.
     counts: Vec<u32>,
+}
+
+/// What is known of the parts.
+enum Known {
+    Plan(Plan),
+    /// Nothing: the one task is to part the mesh.
+    Request(Request),
 }
 
 /// A task that is done.
@@ -70,12 +78,30 @@ impl Open {
 
 impl Tasks {
     /// # Errors
-    /// If there is no plan, or one of another version.
+    /// If there is no plan and nothing is asked for, or by another version.
     pub fn of(folder: &Path) -> Result<Self> {
-        let plan = Folder(folder).checked_plan()?;
-        let mut counts = plan.levels();
-        counts.push(1);
-        Ok(Self { folder: folder.to_owned(), plan, counts })
+        let request = if folder.join(PLAN).exists() { None } else { Request::of(folder)? };
+        let (known, counts) = if let Some(request) = request {
+            (Known::Request(request), vec![1])
+        } else {
+            let plan = Folder(folder).checked_plan()?;
+            let counts = plan.levels().into_iter().chain([1]).collect();
+            (Known::Plan(plan), counts)
+        };
+        Ok(Self { folder: folder.to_owned(), known, counts })
+    }
+
+    /// Whether the parts are known: otherwise there is one task, which makes the plan.
+    pub fn are_planned(&self) -> bool {
+        matches!(self.known, Known::Plan(_))
+    }
+
+    /// Which pieces are there of a mesh that is to be parted later.
+    pub fn pieces(&self) -> Result<Option<Awaited>> {
+        match &self.known {
+            Known::Plan(_) => Ok(None),
+            Known::Request(request) => request.pieces().map(Some),
+        }
     }
 
     /// All tasks, those first that others have to be done for.
@@ -94,7 +120,14 @@ impl Tasks {
             self.all().filter(|other| *other != task).collect()
         } else {
             // Parts need none.
-            self.plan.children(task).unwrap_or_default()
+            self.plan().and_then(|plan| plan.children(task).ok()).unwrap_or_default()
+        }
+    }
+
+    fn plan(&self) -> Option<&Plan> {
+        match &self.known {
+            Known::Plan(plan) => Some(plan),
+            Known::Request(_) => None,
         }
     }
 
@@ -123,6 +156,7 @@ impl Tasks {
     pub fn name(&self, task: Node) -> String {
         let Node { level, index } = task;
         match level {
+            _ if !self.are_planned() => "part the mesh".to_owned(),
             0 => format!("build {index}/{}", self.counts[0]),
             _ if task == self.last() => "write the file".to_owned(),
             _ => format!("join {level}/{index}"),
@@ -131,12 +165,20 @@ impl Tasks {
 
     /// The file that it writes.
     pub fn result(&self, task: Node) -> PathBuf {
-        if task == self.last() { self.folder.join(FILE) } else { Folder(&self.folder).built(task) }
+        match &self.known {
+            Known::Request(_) => self.folder.join(PLAN),
+            Known::Plan(_) if task == self.last() => self.folder.join(FILE),
+            Known::Plan(_) => Folder(&self.folder).built(task),
+        }
     }
 
     /// The file of a note about it.
     pub fn note(&self, task: Node, what: &str) -> PathBuf {
-        self.folder.join(NOTES).join(format!("{}-{}.{what}", task.level, task.index))
+        let name = match &self.known {
+            Known::Request(_) => format!("part.{what}"),
+            Known::Plan(_) => format!("{}-{}.{what}", task.level, task.index),
+        };
+        self.folder.join(NOTES).join(name)
     }
 
     /// Makes the place for notes.
@@ -165,18 +207,16 @@ impl Tasks {
     /// If that is damaged, or of another plan.
     pub fn is_done(&self, task: Node) -> Result<bool> {
         let path = self.result(task);
-        if task == self.last() {
-            return Ok(path.exists());
-        }
+        let Some(plan) = self.plan().filter(|_| task != self.last()) else { return Ok(path.exists()) };
         let file = match File::open(&path) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
             file => file.with_context(|| path.display().to_string())?,
         };
         let again =
-            || format!("{}: remove it, and {} makes it again", path.display(), command_for(task, &self.plan));
-        let (plan, node) = Part::survey(&mut BufReader::new(file)).with_context(again)?;
+            || format!("{}: remove it, and {} makes it again", path.display(), command_for(task, plan));
+        let (its_plan, node) = Part::survey(&mut BufReader::new(file)).with_context(again)?;
         ensure!(
-            plan == self.plan && node == task,
+            its_plan == *plan && node == task,
             "{} is of another plan: remove it, or part the mesh into another folder",
             path.display()
         );
@@ -245,7 +285,8 @@ impl Files {
     }
 }
 
-/// Removes what workers have made of the plan before: the file, and their notes. Parts that are built are kept: they tell their plan.
+/// Removes what workers have made of the plan before, and what was asked of them: the file, and their notes. Parts that are built are kept: they
+/// tell their plan.
 pub fn forget(folder: &Path) -> Result<()> {
     let gone = |done: std::io::Result<()>, path: &Path| match done {
         Err(error) if error.kind() != ErrorKind::NotFound => {
@@ -253,8 +294,10 @@ pub fn forget(folder: &Path) -> Result<()> {
         }
         _ => Ok(()),
     };
-    let (file, notes) = (folder.join(FILE), folder.join(NOTES));
-    gone(fs::remove_file(&file), &file)?;
+    let notes = folder.join(NOTES);
+    for file in [REQUEST, FILE].map(|name| folder.join(name)) {
+        gone(fs::remove_file(&file), &file)?;
+    }
     gone(fs::remove_dir_all(&notes), &notes)
 }
 

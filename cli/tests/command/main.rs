@@ -8,6 +8,8 @@ mod fields;
 mod gallery;
 mod generate;
 mod html;
+#[cfg(unix)]
+mod in_situ;
 mod linking;
 mod npz;
 mod parts;

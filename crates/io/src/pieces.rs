@@ -6,11 +6,11 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use crate::beside::FilesOf;
+use crate::beside::{FilesOf, place};
 use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::fields::settle_unused;
 use crate::file_kind::without_mark;
-use crate::listed::for_each_file;
+use crate::listed::{for_each_file, names};
 use crate::numbering::Numbering;
 use crate::pvtu::{bits, numbered};
 use crate::vtu::{PieceReader, in_order};
@@ -53,6 +53,16 @@ impl Pieces {
             return Ok(None);
         }
         Ok(Some(Self { path: path.to_owned(), list: bytes, options: options.clone() }))
+    }
+
+    /// The files with the pieces, which may not be there.
+    ///
+    /// # Errors
+    /// If the list is damaged, or names a file elsewhere than beside it or below.
+    pub fn files(&self) -> Result<Vec<PathBuf>, ReadError> {
+        let document = Document::parse(without_mark(&self.list)).map_err(|error| self.named(error))?;
+        let files = names(&document).iter().map(|name| place(&self.path, name)).collect::<Result<_, _>>();
+        files.at(String::new).map_err(|error| self.named(error))
     }
 
     /// How much there is, without the values: the points of each piece, and the tetrahedra at most that its cells become.
