@@ -63,7 +63,10 @@ pub(super) fn way(
     match memory {
         Some(most) if needed > most => {
             if let Some(parts) = count_for(config, [points, tetrahedra, fields], pieces, most) {
-                tell(format!("{what} of memory at once, so it is built in {parts} parts"));
+                let disk = bytes(disk_in_parts([points, tetrahedra, fields]));
+                tell(format!(
+                    "{what} of memory at once, so it is built in {parts} parts, with about {disk} of files beside the output until it is done"
+                ));
                 return Ok(Way::Parts(parts));
             }
             let in_parts = match least_memory(config, [points, tetrahedra, fields], pieces) {
@@ -88,6 +91,12 @@ pub(super) fn way(
             Ok(Way::Whole)
         }
     }
+}
+
+/// About how many bytes the files of the steps of a build in parts take: those of the mesh, and at each level what is left and the updates.
+fn disk_in_parts([points, tetrahedra, fields]: [u64; 3]) -> u64 {
+    let more_fields = fields.saturating_sub(1).saturating_mul(points);
+    tetrahedra.saturating_mul(50).saturating_add(more_fields.saturating_mul(40))
 }
 
 /// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are

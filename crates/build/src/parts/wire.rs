@@ -125,7 +125,9 @@ pub fn read_frame<T: DeserializeOwned>(input: &mut dyn Read) -> Result<T, PartsE
 /// Reads a value of numbers alone: its bytes are never there as a whole.
 pub fn read_numbers<T: DeserializeOwned>(input: &mut dyn Read) -> Result<T, PartsError> {
     read_by(input, |frame| {
-        let value = postcard::from_io((&mut *frame, &mut [])).ok().map(|(value, _)| value);
+        // For one number at a time.
+        let mut room = [0; 8];
+        let value = postcard::from_io((&mut *frame, &mut room)).ok().map(|(value, _)| value);
         io::copy(frame, &mut io::sink())?;
         Ok(value)
     })

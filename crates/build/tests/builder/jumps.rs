@@ -242,6 +242,8 @@ fn parts_keep_the_values_of_each_region() {
         assert!(bytes(&in_parts(&mesh, &config(), 1)) == bytes(&whole), "one part is the whole");
         for parts in [2, 16] {
             let built = in_parts(&mesh, &config(), parts);
+            // And what its blocks reach is compared with a run through the MT.
+            assert!(!bytes(&built).is_empty());
             let Mt::HalfEdge(mt) = &built.mt else { panic!("a half-edge MT") };
             for error in [f64::INFINITY, 0.1, 0.0] {
                 let front = front_at(mt, &Request::within(error));

@@ -242,6 +242,8 @@ fn parts_keep_regions_and_points() {
             let mt = in_parts(&mesh, &config, parts).mt;
             let report = verify::run(&mt, &mesh, Reference::Mesh, &mut |_, _| {});
             assert!(report.valid, "{name}, {parts}: {:#?}", report.failures);
+            let said = |mt: &Mt| mt.regions().map(|regions| regions.all.clone());
+            assert_eq!(said(&mt), said(&whole.mt), "{name}, {parts}");
             let mut first = None;
             at_all_errors(&mt, |mesh, error| {
                 let found = volumes(&mt, mesh, |p| regions(block(p)));
