@@ -37,6 +37,9 @@ const BATCHES: usize = 64;
 /// Batches are at least so large.
 const SMALLEST_BATCH: usize = 64;
 
+/// A hole has about so many tetrahedra.
+const USUAL_HOLE: u32 = 24;
+
 /// An edge that is contracted has about so many tetrahedra around it, at most.
 const LARGEST_FAN: u32 = 10;
 
@@ -211,7 +214,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         }
     }
 
-    /// Frees what belongs to tetrahedra that are gone, if they are many.
+    /// Frees what belongs to tetrahedra that are gone, if they are many, and what takes too much with those that are left.
     fn compact(&mut self) {
         let State { mesh, buckets, removals, restrictions, .. } = &mut self.state;
         if let Some(live) = mesh.compact() {
@@ -220,6 +223,8 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
             restrictions.renumber(&live);
             self.record.renumber(&live);
         }
+        let of_a_tet = self.state.reference.points / self.state.mesh.live().max(1);
+        self.searches.limit((USUAL_HOLE * of_a_tet) as usize);
     }
 
     /// Evaluates the candidates of a round in batches and removes vertices in the order of the keys. Between batches,

@@ -24,6 +24,9 @@ pub(crate) struct Searches {
 /// So many removals for each thread are prepared at a time. With one thread none is prepared in vain.
 const AHEAD: usize = 32;
 
+/// But not more than have so many points in their holes, together: each keeps where all of them go.
+const AHEAD_POINTS: usize = 1 << 17;
+
 impl Searches {
     /// For the threads of rayon's current pool.
     pub fn new(gift_wrap: Option<GiftWrap>) -> Self {
@@ -36,10 +39,17 @@ impl Searches {
         }
     }
 
+    /// Prepares no more removals at a time from now on than is good where holes have so many points.
+    pub fn limit(&mut self, points: usize) {
+        let most = AHEAD_POINTS / points.max(1);
+        self.ahead.truncate(most.max(self.all.len()));
+    }
+
     /// Prepares the removals with these keys, no more than there are searches for. For each whether it is due.
     pub fn prepare(&mut self, state: &State<'_>, keys: &[Key], level: u16) -> Vec<bool> {
         let prepare = |search: &mut RemovalSearch, &key: &Key| search.prepare(state, key, level);
-        threads::map_mut(&mut self.ahead, keys, AHEAD / 4, prepare)
+        let share = (self.ahead.len() / (4 * self.all.len())).max(1);
+        threads::map_mut(&mut self.ahead, keys, share, prepare)
     }
 
     /// The search of this thread.

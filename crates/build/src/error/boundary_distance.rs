@@ -1,6 +1,7 @@
 //! The boundary of the reference mesh, and how far a point is from it.
 
 use crate::geometry::triangle_fan::TriangleFan;
+use crate::lattice::quantize::Quantized;
 use foldhash::HashMap;
 use glam::DVec3;
 use tetralod::geom::{Groups, nearest_on_triangle};
@@ -24,14 +25,15 @@ pub(crate) struct BoundaryDistance {
 
 impl BoundaryDistance {
     /// Of the triangles without a neighbour.
-    pub fn new(tets: &[[u32; 4]], neighbors: &[[u32; 4]], positions: &[DVec3]) -> Self {
-        Self::of(boundary_faces(tets, neighbors).map(|(_, face)| face).collect(), positions)
+    pub fn new(tets: &[[u32; 4]], neighbors: &[[u32; 4]], quantized: &Quantized) -> Self {
+        Self::of(boundary_faces(tets, neighbors).map(|(_, face)| face).collect(), quantized)
     }
 
     /// Of these triangles, counter-clockwise when seen from outside.
-    pub fn of(corners: Vec<[u32; 3]>, positions: &[DVec3]) -> Self {
-        let triangles: Vec<_> = corners.iter().map(|face| face.map(|v| positions[v as usize])).collect();
-        let around = Groups::new(positions.len(), |add| {
+    pub fn of(corners: Vec<[u32; 3]>, quantized: &Quantized) -> Self {
+        let triangles: Vec<_> = corners.iter().map(|face| face.map(|v| quantized.scaled(v))).collect();
+        let points = quantized.positions.len();
+        let around = Groups::new(points, |add| {
             (0..).zip(&corners).for_each(|(t, face)| face.iter().for_each(|v| add(*v as usize, t)));
         });
         let fan = |v: u32| {
@@ -39,9 +41,9 @@ impl BoundaryDistance {
                 let first = corners[t as usize].iter().position(|&corner| corner == v).unwrap_or(0);
                 [1, 2].map(|k| triangles[t as usize][(first + k) % 3])
             };
-            TriangleFan::new(positions[v as usize], around.of(v as usize), others)
+            TriangleFan::new(quantized.scaled(v), around.of(v as usize), others)
         };
-        let with_many = (0..positions.len() as u32).filter(|&v| around.of(v as usize).len() > MANY);
+        let with_many = (0..points as u32).filter(|&v| around.of(v as usize).len() > MANY);
         let fans = with_many.map(|v| (v, fan(v))).collect();
         Self {
             triangles,

@@ -64,7 +64,7 @@ impl<'a> Reference<'a> {
     /// `displacement_per_error`.
     pub fn new(quantized: &'a Quantized, mesh: &WorkMesh, displacement_per_error: f64, edges: f64) -> Self {
         let shortest = quantized.shortest_edges(&mesh.tets);
-        let boundary = BoundaryDistance::new(&mesh.tets, &mesh.neighbors, &quantized.scaled());
+        let boundary = BoundaryDistance::new(&mesh.tets, &mesh.neighbors, quantized);
         Self::of(quantized, boundary, shortest, (displacement_per_error, edges))
     }
 

@@ -80,21 +80,21 @@ impl Quantized {
         as_vec(self.positions[point as usize])
     }
 
-    /// All points on the lattice in model units, from its origin.
-    pub fn scaled(&self) -> Vec<DVec3> {
-        let step = DVec3::from_array(self.lattice.step);
-        self.positions.iter().map(|&q| as_vec(q) * step).collect()
+    /// A vertex on the lattice in model units, from its origin.
+    pub fn scaled(&self, vertex: u32) -> DVec3 {
+        as_vec(self.positions[vertex as usize]) * DVec3::from_array(self.lattice.step)
     }
 
     /// For each point the square of the shortest edge there, in model units; infinite without any.
     pub fn shortest_edges(&self, tets: &[[u32; 4]]) -> Vec<f64> {
-        let places = self.scaled();
-        let mut shortest = vec![f64::INFINITY; places.len()];
+        let mut shortest = vec![f64::INFINITY; self.positions.len()];
         for tet in tets {
-            for [a, b] in EDGES.map(|edge| edge.map(|i| tet[i] as usize)) {
+            let places = tet.map(|v| self.scaled(v));
+            for [a, b] in EDGES {
                 let squared = places[a].distance_squared(places[b]);
-                shortest[a] = shortest[a].min(squared);
-                shortest[b] = shortest[b].min(squared);
+                for v in [tet[a], tet[b]].map(|v| v as usize) {
+                    shortest[v] = shortest[v].min(squared);
+                }
             }
         }
         shortest

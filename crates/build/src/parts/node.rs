@@ -151,7 +151,7 @@ fn state<'a>(
         true => boundary_faces(&piece.tets, &neighbors).map(|(_, face)| face).collect(),
         false => take(&mut piece.boundary),
     };
-    let boundary = BoundaryDistance::of(boundary, &quantized.scaled());
+    let boundary = BoundaryDistance::of(boundary, quantized);
     let of_errors = (plan.displacement_per_error, plan.displacement_edges);
     let reference = Reference::of(quantized, boundary, take(&mut piece.shortest), of_errors);
     let mut open = vec![false; points];
