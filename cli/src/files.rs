@@ -12,8 +12,8 @@ use std::time::Duration;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode_to};
 use tetralod::mt::{Exact, Mt, MtInfo};
 use tetralod::session::{Client, Session};
-use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, Traffic, WantedRange};
-use tetralod::stream::{HttpOptions, HttpSource};
+use tetralod::stream::{Arrived, FileSource, RangeSource, ShardedFile, StreamError, Traffic, WantedRange};
+use tetralod::stream::{HttpOptions, HttpSource, shard_suffix};
 use tetralod_build::verify::Reference;
 use tetralod_build::{Construction, Method};
 
@@ -375,11 +375,20 @@ impl Bytes {
             );
         }
         if fs::metadata(path)?.is_file() {
-            return Ok(Self(Box::new(FileSource::new(File::open(path)?)?)));
+            let shards = path.to_owned();
+            let open = move |suffix: &str| File::open(with_suffix(&shards, suffix));
+            return Ok(Self(Box::new(FileSource::new(ShardedFile::new(File::open(path)?, open)?)?)));
         }
         // Pipes cannot be sought in.
         Ok(Self(Box::new(FileSource::new(Cursor::new(fs::read(path)?))?)))
     }
+}
+
+/// A path with more behind its name.
+pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    name.into()
 }
 
 /// The address, if a path is one.
