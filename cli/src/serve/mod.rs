@@ -232,10 +232,17 @@ impl Shared {
     fn has(self, path: &str) -> bool {
         match self {
             Self::Nothing => false,
-            Self::MtFiles => path.to_ascii_lowercase().ends_with(".mt"),
+            Self::MtFiles => is_mt_file(path),
             Self::All => true,
         }
     }
+}
+
+/// Whether a path is that of an MT file, or of a shard of one.
+fn is_mt_file(path: &str) -> bool {
+    let name = path.trim_end_matches(|c: char| c.is_ascii_digit());
+    let name = if name.len() + 4 <= path.len() { name.strip_suffix('.').unwrap_or(path) } else { path };
+    name.to_ascii_lowercase().ends_with(".mt")
 }
 
 /// What a server is called by those who mean it. A page elsewhere can give its own name the address of this machine, to read what is served

@@ -8,8 +8,8 @@ mod volumes;
 use self::cache::Cache;
 use self::page::Page;
 use self::volumes::Volumes;
-use super::output;
 use super::serve::{self, Shared, with_status};
+use super::{files, output};
 use anyhow::Result;
 use axum::extract::{Path as InAddress, Request, State};
 use axum::http::StatusCode;
@@ -81,13 +81,16 @@ async fn list(State(volumes): State<Arc<Volumes>>) -> Response {
     Json(volumes.list()).into_response()
 }
 
-/// The MT file of a volume; its name is for people.
+/// The MT file of a volume, or a shard of it; its name is for people, but for what stands behind `.mt`.
 async fn file(
     State(volumes): State<Arc<Volumes>>,
-    InAddress((number, _)): InAddress<(usize, String)>,
+    InAddress((number, name)): InAddress<(usize, String)>,
     request: Request,
 ) -> Response {
     let Some(path) = volumes.file(number) else { return with_status(StatusCode::NOT_FOUND) };
+    let suffix = name.rsplit_once(".mt").map_or("", |(_, suffix)| suffix);
+    let is_shard = suffix.starts_with('.') && suffix[1..].chars().all(|c| c.is_ascii_digit());
+    let path = if is_shard { files::with_suffix(&path, suffix) } else { path };
     match ServeFile::new(path).try_call(request).await {
         Ok(response) => response.into_response(),
         Err(_) => with_status(StatusCode::NOT_FOUND),
