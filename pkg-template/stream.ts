@@ -100,23 +100,28 @@ export async function openSource(source: Source, signal?: AbortSignal, { headers
 function withShards(first: OpenSource, openNext: (url: string) => Promise<OpenSource | undefined>, url: string): OpenSource {
   const start = new Uint8Array(STATED);
   let [shard, number, at, size] = [first, 0, 0, 0];
+  // Where the shard begins and ends.
+  let [from, end] = [0, Infinity];
+  const check = (length: number) => {
+    if (length !== end - from) throw wrongShard(number, length, end - from);
+  };
   const next = async (): Promise<IteratorResult<Bytes, undefined>> => {
     for (;;) {
       const found = await shard.chunks.next();
       if (!found.done) {
         if (at < STATED) start.set(found.value.subarray(0, STATED - at), at);
         at += found.value.length;
+        if (at > end) check(at - from);
         return found;
       }
       const total = statedBytes(start) ?? 0;
       if (number === 0) size = at;
-      const from = number * size;
-      const expected = Math.min(size, total - from);
-      if (number > 0 && at - from !== expected) throw wrongShard(number, at - from, expected);
+      else check(at - from);
       if (at >= total) return found;
       const opened = await openNext(shardAddress(url, ++number));
       if (!opened) throw missingShard(number, at, total);
-      shard = opened;
+      [shard, from, end] = [opened, at, Math.min(at + size, total)];
+      if (opened.total !== undefined) check(opened.total);
     }
   };
   return { ...first, chunks: { next, return: () => shard.chunks.return?.() } };

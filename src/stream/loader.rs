@@ -354,14 +354,20 @@ impl Loader {
             Ok(ResponseContent::Part(part)) => {
                 self.requests[at].body = base + part.start..base + part.end;
                 self.ranges = Some(true);
-                self.end_at(self.file.end());
+                self.settle_end();
             }
             Ok(ResponseContent::Whole(end)) => self.take_whole(at, base.saturating_add(end)),
             Ok(ResponseContent::Beyond(end)) => {
                 let request = self.requests.swap_remove(at);
                 // Its body, if any, says nothing.
                 self.cancelled.push(id);
-                self.go_beyond(&request, end);
+                if self.awaits_header() && request.asked.start > 0 {
+                    // Then it is known where this is.
+                    let error = StreamError::WrongRange("nothing, before its beginning has come".to_owned());
+                    self.stumble(request, error, now_ms, 0);
+                } else {
+                    self.go_beyond(&request, end);
+                }
             }
             Err(error) => {
                 let request = self.requests.swap_remove(at);
@@ -548,8 +554,26 @@ impl Loader {
 
     /// The bytes at a place have come: they may be those of the header, which says whether the file goes on in other shards.
     fn take_start(&mut self, at: u64, bytes: &[u8]) {
+        if self.file.rest_of_header().is_empty() {
+            return;
+        }
         self.file.take_start(at, bytes);
-        self.look_for_shards();
+        if self.file.rest_of_header().is_empty() {
+            self.look_for_shards();
+            self.end_at(self.file.end());
+        }
+    }
+
+    /// There are no bytes beyond the end of the file, as it is known now; unless its header is on its way, which may say otherwise.
+    fn settle_end(&mut self) {
+        if !self.awaits_header() {
+            self.end_at(self.file.end());
+        }
+    }
+
+    /// Whether the header of the file is wanted, and has not come.
+    fn awaits_header(&self) -> bool {
+        self.needed.first_in(&self.file.rest_of_header()).is_some()
     }
 
     /// Sees that the file is in shards, if it shows now: then there is more of it to be needed.
@@ -702,7 +726,8 @@ impl Loader {
             self.requests.push(request);
         }
         if end != UNKNOWN && is_last {
-            self.end_at(end);
+            self.file.end_at(end);
+            self.settle_end();
         }
     }
 
@@ -756,6 +781,7 @@ impl Loader {
     /// The range to ask for: of what is in `within`, or from the most important bytes on.
     fn plan(&self, within: Option<&Range<u64>>) -> Option<Range<u64>> {
         let mut free = self.needed.clone();
+        free.remove(&(self.file.end()..UNKNOWN));
         for range in self.under_way() {
             free.remove(&range);
         }

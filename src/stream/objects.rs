@@ -122,6 +122,12 @@ impl Objects {
         }
     }
 
+    /// The bytes of the header that have not come, if there are that many.
+    pub fn rest_of_header(&self) -> Range<u64> {
+        let end = if self.end() < HEADER_BYTES as u64 { 0 } else { HEADER_BYTES as u64 };
+        self.start.len() as u64..end
+    }
+
     /// Takes what of a chunk is of the header.
     pub fn take_start(&mut self, at: u64, bytes: &[u8]) {
         let held = self.start.len();

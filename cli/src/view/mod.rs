@@ -8,8 +8,8 @@ mod volumes;
 use self::cache::Cache;
 use self::page::Page;
 use self::volumes::Volumes;
+use super::output;
 use super::serve::{self, Shared, with_status};
-use super::{files, output};
 use anyhow::Result;
 use axum::extract::{Path as InAddress, Request, State};
 use axum::http::StatusCode;
@@ -21,7 +21,6 @@ use std::io::Write;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
-use tower_http::services::ServeFile;
 
 /// Shows volumes in the browser: MT files, and all that `tetralod build` reads, of which it builds MT files and keeps them in a cache.
 ///
@@ -89,12 +88,7 @@ async fn file(
 ) -> Response {
     let Some(path) = volumes.file(number) else { return with_status(StatusCode::NOT_FOUND) };
     let suffix = name.rsplit_once(".mt").map_or("", |(_, suffix)| suffix);
-    let is_shard = suffix.starts_with('.') && suffix[1..].chars().all(|c| c.is_ascii_digit());
-    let path = if is_shard { files::with_suffix(&path, suffix) } else { path };
-    match ServeFile::new(path).try_call(request).await {
-        Ok(response) => response.into_response(),
-        Err(_) => with_status(StatusCode::NOT_FOUND),
-    }
+    serve::file_or_shard(&path, suffix, request).await
 }
 
 /// Says where the page is, and opens it.

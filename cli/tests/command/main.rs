@@ -16,6 +16,7 @@ mod remote;
 mod render;
 mod repair;
 mod serve;
+mod shards;
 mod support;
 mod surfaces;
 mod view;
