@@ -554,14 +554,13 @@ impl Loader {
 
     /// The bytes at a place have come: they may be those of the header, which says whether the file goes on in other shards.
     fn take_start(&mut self, at: u64, bytes: &[u8]) {
-        if self.file.rest_of_header().is_empty() {
+        let rest = self.file.rest_of_header();
+        if rest.is_empty() || at > rest.start {
             return;
         }
         self.file.take_start(at, bytes);
-        if self.file.rest_of_header().is_empty() {
-            self.look_for_shards();
-            self.end_at(self.file.end());
-        }
+        self.look_for_shards();
+        self.settle_end();
     }
 
     /// There are no bytes beyond the end of the file, as it is known now; unless its header is on its way, which may say otherwise.
@@ -759,11 +758,6 @@ impl Loader {
 
     /// The next range to ask for.
     fn choose(&mut self, now: u64) -> Option<Chosen> {
-        if let (Measures::Due, Some(total), Some(_)) = (self.measures, self.file.stated(), self.needed.hull())
-        {
-            self.measures = Measures::Done;
-            return Some(Chosen { range: 0..total, strikes: 0, measures: true });
-        }
         while let Some(due) = self.pauses.iter().position(|pause| pause.until <= now) {
             let Pause { range, measures, strikes, .. } = self.pauses.swap_remove(due);
             let range = if measures { Some(range) } else { self.plan(Some(&range)) };
@@ -774,8 +768,15 @@ impl Loader {
         // Until the server has shown that it gives ranges, several requests might fetch the file several times.
         let most = if self.ranges == Some(true) { self.options.max_requests.max(1) } else { 1 };
         let room = self.requests.len() + self.pauses.len() < most;
-        let range = if room { self.plan(None) } else { None };
-        range.map(|range| Chosen { range, strikes: 0, measures: false })
+        if !room {
+            return None;
+        }
+        if let (Measures::Due, Some(total), Some(_)) = (self.measures, self.file.stated(), self.needed.hull())
+        {
+            self.measures = Measures::Done;
+            return Some(Chosen { range: 0..total, strikes: 0, measures: true });
+        }
+        self.plan(None).map(|range| Chosen { range, strikes: 0, measures: false })
     }
 
     /// The range to ask for: of what is in `within`, or from the most important bytes on.

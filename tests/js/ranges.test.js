@@ -361,7 +361,11 @@ test("a file in shards comes as one, whatever the server tells of them", async (
       ranges.close();
       // The shards that are needed, and one request at most to learn that there are some, and how long they are.
       const paths = new Set(asked.map(({ path }) => path));
-      assert.deepEqual([...paths].sort(), Array.from({ length: Math.ceil(SIZE / size) }, (_, i) => `/file.mt${i ? `.000${i}` : ""}`), what);
+      assert.deepEqual(
+        [...paths].sort(),
+        Array.from({ length: Math.ceil(SIZE / size) }, (_, i) => `/file.mt${i ? `.000${i}` : ""}`),
+        what,
+      );
       assert.ok(asked.length <= 16, `${what}: ${asked.length} requests`);
     }
   }

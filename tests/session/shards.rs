@@ -79,7 +79,7 @@ impl Served {
         };
         let content_range = match status {
             416 => format!("bytes */{total}"),
-            _ => format!("bytes {}-{}/{total}", part.start, part.end - 1),
+            _ => format!("bytes {}-{}/{total}", part.start, part.end.saturating_sub(1)),
         };
         let head = ResponseHead {
             status,
@@ -137,7 +137,12 @@ fn agrees<S: RangeSource>(file: &[u8], source: S, what: &str) {
         whole.refine(&request).expect("a sound file");
         assert_eq!(client.session().hash(), whole.hash(), "{what}: {request:?}");
     }
-    assert_eq!(client.total(), Some(file.len() as u64), "{what}");
+    // Where the length of an object is not to be seen, that of the file is known when something of another shard is needed.
+    let total = client.total();
+    assert!(
+        total == Some(file.len() as u64) || total.is_none() && what.contains("Hidden"),
+        "{what}: {total:?}"
+    );
 }
 
 /// From shards that hold little more than the header, to two of which the last is one byte.
