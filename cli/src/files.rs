@@ -376,7 +376,7 @@ impl Bytes {
     }
 
     /// Hands on all bytes, one piece after the other; returns how many they are.
-    fn read_all(mut self, mut take: impl FnMut(&[u8]) -> Result<()>) -> Result<u64> {
+    pub fn read_all(mut self, mut take: impl FnMut(&[u8]) -> Result<()>) -> Result<u64> {
         let mut at = 0;
         loop {
             let range = at..at + CHUNK;

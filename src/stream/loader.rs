@@ -572,7 +572,8 @@ impl Loader {
 
     /// Whether the header of the file is wanted, and has not come.
     fn awaits_header(&self) -> bool {
-        self.needed.first_in(&self.file.rest_of_header()).is_some()
+        let rest = self.file.rest_of_header();
+        self.needed.first_in(&rest).is_some_and(|next| next.start == rest.start)
     }
 
     /// Sees that the file is in shards, if it shows now: then there is more of it to be needed.

@@ -17,7 +17,7 @@ fn files_are_cut_put_together_and_read_as_one() {
     let folder = Folder::new("shards");
     let [grid, mt, cut, back, built] =
         ["b.vti", "b.mt", "cut.mt", "back.mt", "built.mt"].map(|name| folder.path(name));
-    bucky(25, &grid, &mt);
+    bucky(33, &grid, &mt);
     let whole = fs::read(&mt).expect("it is there");
     let count = whole.len().div_ceil(64 << 10);
     assert!(count >= 3, "{} bytes", whole.len());
@@ -65,7 +65,7 @@ fn files_are_cut_put_together_and_read_as_one() {
 fn shards_that_are_not_as_they_must_be_are_named() {
     let folder = Folder::new("shards-bad");
     let [grid, mt, cut, out] = ["b.vti", "b.mt", "cut.mt", "out.vtu"].map(|name| folder.path(name));
-    bucky(25, &grid, &mt);
+    bucky(33, &grid, &mt);
     good(&["convert", &mt, "--shard-size", "64K", "-o", &cut, "--quiet"]);
     let server = Server::start(&[&cut]);
     let second = folder.path("cut.mt.0001");
