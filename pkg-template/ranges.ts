@@ -7,6 +7,7 @@ import { TetralodError, known, ofFile, reviveError } from "./errors.js";
 import type { Traffic } from "./results.js";
 import { Remote, portEndpoint } from "./rpc.js";
 import type { ReaderMethods, ReaderPort } from "./stream.js";
+import { shardAddress } from "./shards.js";
 import type { RangeLoader } from "./tetralod_core.js";
 
 /** The headers that the loader reads, in its order. */
@@ -87,9 +88,10 @@ interface Kept {
   clear(): void;
 }
 
-/** What the loader wants next: a request or its end, a range of the cache, or a wait. */
+/** What the loader wants next: a request, by places in a shard, or its end, a range of the cache, or a wait. */
 interface Action {
   id?: number;
+  shard?: number;
   start?: number;
   end?: number;
   until?: number;
@@ -106,8 +108,8 @@ type Tell = (what: (now: number) => void) => boolean;
 export class Ranges {
   #loader: RangeLoader;
   #url: string;
-  /** Where redirects led to. */
-  #ledTo: string;
+  /** Where redirects led to, for each shard. */
+  #ledTo = new Map<number, string>();
   /** Whether other origins that redirects led to are asked directly. They are not sent the caller's headers; some refuse without. */
   #asksOthers = true;
   #options: RangesOptions;
@@ -128,13 +130,14 @@ export class Ranges {
   #forgets = false;
 
   constructor(Loader: Loader, url: string, sink: RangesSink, options: RangesOptions = {}) {
+    this.#url = new URL(url, globalThis.location?.href).href;
     // What a file of the user does not give at once, it does not give later.
     const { blob, reader } = options;
-    if (blob) options = { ...options, fetch: answering(blob.size, (start, end) => blob.slice(start, end)), retries: 0, cache: undefined };
+    if (blob) options = { ...options, fetch: answering(this.#url, blob.size, (start, end) => blob.slice(start, end)), retries: 0, cache: undefined };
     if (reader) {
       const remote = new Remote<ReaderMethods>(portEndpoint(reader.port));
       const read = async (start: number, end: number) => (await remote.call("read", [start, end])).bytes;
-      options = { timeoutMs: FOREVER, ...options, fetch: answering(reader.size, read, reader.ranges), retries: 0, cache: undefined };
+      options = { timeoutMs: FOREVER, ...options, fetch: answering(this.#url, reader.size, read, reader.ranges), retries: 0, cache: undefined };
       // What is between the ranges that are there cannot be asked for with them.
       if (reader.ranges) options.gap = 0;
       this.#release = () => remote.close(new Error("the file was closed"));
@@ -142,7 +145,6 @@ export class Ranges {
     const { maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs } = options;
     this.#loader = new Loader(maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs, Math.random());
     if (reader?.ranges) this.#loader.hold(Float64Array.from(reader.ranges));
-    this.#url = this.#ledTo = new URL(url, globalThis.location?.href).href;
     this.#options = options;
     // What the caller's own function puts into a request is meant for the address that was given.
     if (options.fetch) this.#asksOthers = false;
@@ -239,7 +241,7 @@ export class Ranges {
     this.#now();
     this.#due = Infinity;
     for (let action: Action | undefined; (action = this.#loader.next(this.#now())); ) {
-      const { id, start = 0, end = 0, until } = action;
+      const { id, shard = 0, start = 0, end = 0, until } = action;
       if (until !== undefined) {
         this.#due = Math.max(until - this.#clock, 1);
         this.#timer = setTimeout(() => this.go(), this.#due);
@@ -251,7 +253,7 @@ export class Ranges {
         this.#open.get(id)?.abort();
         this.#open.delete(id);
       } else {
-        this.#fetch(id, start, end);
+        this.#fetch(id, shard, [start, end]);
       }
     }
   }
@@ -299,7 +301,7 @@ export class Ranges {
   }
 
   /** One request from beginning to end. */
-  async #fetch(id: number, start: number, end: number) {
+  async #fetch(id: number, shard: number, range: [number, number]) {
     const controller = new AbortController();
     this.#open.set(id, controller);
     const tell: Tell = (what) => {
@@ -308,9 +310,9 @@ export class Ranges {
       this.go();
       return !this.#closed && this.#open.get(id) === controller;
     };
-    const asked = this.#ledTo;
+    const asked = this.#ledTo.get(shard) ?? shardAddress(this.#url, shard);
     try {
-      await this.#receive(id, asked, [start, end], controller.signal, tell);
+      await this.#receive(id, [shard, asked], range, controller.signal, tell);
     } catch (error) {
       const blocked = !controller.signal.aborted && (await this.#isBlocked(error, asked, controller.signal));
       // A reader knows best what is wrong.
@@ -333,15 +335,15 @@ export class Ranges {
     if (STREAMING.includes(nextHopProtocol)) this.#loader.setMaxRequests(STREAMS);
   }
 
-  async #receive(id: number, url: string, [start, end]: [number, number], signal: AbortSignal, tell: Tell) {
+  async #receive(id: number, [shard, url]: [number, string], [start, end]: [number, number], signal: AbortSignal, tell: Tell) {
     const response = await this.#request(url, start, end, signal);
-    if (GONE.includes(response.status) && url !== this.#url) {
+    if (GONE.includes(response.status) && url !== shardAddress(this.#url, shard)) {
       // Addresses that redirects lead to may be good for a while only.
-      if (this.#ledTo === url) this.#ledTo = this.#url;
+      if (this.#ledTo.get(shard) === url) this.#ledTo.delete(shard);
       if (this.#options.headers && !this.#isOwn(url)) this.#asksOthers = false;
       throw new Error(`HTTP ${response.status} where a redirect led to`);
     }
-    if (response.ok && response.url && (this.#isOwn(response.url) || this.#asksOthers)) this.#ledTo = response.url;
+    if (response.ok && response.url && (this.#isOwn(response.url) || this.#asksOthers)) this.#ledTo.set(shard, response.url);
     const fields = FIELDS.map((name) => response.headers.get(name));
     if (!tell((now) => this.#loader.head(id, now, response.status, fields))) return;
     await this.#body(response, (bytes) => tell((now) => this.#loader.data(id, now, bytes)));
@@ -450,9 +452,18 @@ class SharedVersion implements Kept {
   }
 }
 
-/** Answers requests for ranges of a file of this size as a server would, by what `read` gives of those that are there. */
-function answering(size: number, read: (start: number, end: number) => BodyInit | Promise<BodyInit>, there: readonly number[] = [0, size]): Fetch {
-  return async (_, { headers }) => {
+/**
+ * Answers requests for ranges of the file at `address`, of this size, as a server would, by what `read` gives of those that are there. Other
+ * shards of it are not.
+ */
+function answering(
+  address: string,
+  size: number,
+  read: (start: number, end: number) => BodyInit | Promise<BodyInit>,
+  there: readonly number[] = [0, size],
+): Fetch {
+  return async (asked, { headers }) => {
+    if (asked !== address) return new Response(null, { status: 404 });
     const [, first, last] = /^bytes=(\d+)-(\d*)$/.exec(headers.get("range") ?? "") ?? ["", "0", ""];
     const start = Number(first);
     const until = there.find((_, i) => i % 2 === 1 && there[i - 1] <= start && start < there[i]) ?? 0;

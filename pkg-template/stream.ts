@@ -7,6 +7,7 @@
 
 import { TetralodError, known, ofFile } from "./errors.js";
 import { portEndpoint, serve } from "./rpc.js";
+import { STATED, shardAddress, shardSuffix, statedBytes } from "./shards.js";
 
 /** Everything that an MT can be read from. Bytes in memory are copied, not taken away. */
 export type Source =
@@ -71,8 +72,19 @@ export async function openSource(source: Source, signal?: AbortSignal, { headers
   signal?.throwIfAborted();
   const url = urlOf(source);
   if (url !== undefined && nodeModule("node:fs") && isPath(url)) throw new TetralodError("bad-source", `${url}: ${NO_PATH}`);
-  if (url?.startsWith("file:") && nodeModule("node:fs")) return openFile(url);
-  if (url !== undefined) return openResponse(await request(source as string | URL | Request, url, { signal, headers, credentials }), url);
+  if (url?.startsWith("file:") && nodeModule("node:fs")) return withShards(await openFile(url), (next) => openFile(next).catch(() => undefined), url);
+  if (url !== undefined) {
+    const given = source as string | URL | Request;
+    const along = { signal, headers, credentials };
+    const openNext = async (next: string) => {
+      const response = await request(isInstance(given, "Request") ? new Request(next, given) : next, next, along);
+      const isThere = response.ok && !/^text\/html/i.test(response.headers.get("content-type") ?? "");
+      if (isThere) return openResponse(response, next);
+      response.body?.cancel().catch(() => {});
+      return undefined;
+    };
+    return withShards(openResponse(await request(given, url, along), url), openNext, url);
+  }
   if (isInstance(source, "Response")) return openResponse(source, source.url || "response");
   if (isInstance(source, "Blob")) return open(source.name || "blob", source.size, source.stream());
   if (isReader(source)) {
@@ -82,6 +94,51 @@ export async function openSource(source: Source, signal?: AbortSignal, { headers
   const bytes = bytesOf(source);
   if (bytes) return { name: "bytes", total: bytes.byteLength, chunks: pieces(bytes) };
   return open("stream", undefined, source);
+}
+
+/** A source with the shards that its header says that it goes on in, if it does. */
+function withShards(first: OpenSource, openNext: (url: string) => Promise<OpenSource | undefined>, url: string): OpenSource {
+  const start = new Uint8Array(STATED);
+  let [shard, number, at, size] = [first, 0, 0, 0];
+  // Where the shard begins and ends.
+  let [from, end] = [0, Infinity];
+  const check = (length: number) => {
+    if (length !== end - from) throw wrongShard(number, length, end - from);
+  };
+  const next = async (): Promise<IteratorResult<Bytes, undefined>> => {
+    for (;;) {
+      const found = await shard.chunks.next();
+      if (!found.done) {
+        if (at < STATED) start.set(found.value.subarray(0, STATED - at), at);
+        at += found.value.length;
+        if (at > end) check(at - from);
+        return found;
+      }
+      const total = statedBytes(start) ?? 0;
+      if (number === 0) size = at;
+      else check(at - from);
+      if (at >= total) return found;
+      const opened = await openNext(shardAddress(url, ++number));
+      if (!opened) throw missingShard(number, at, total);
+      [shard, from, end] = [opened, at, Math.min(at + size, total)];
+      if (opened.total !== undefined) check(opened.total);
+    }
+  };
+  return { ...first, chunks: { next, return: () => shard.chunks.return?.() } };
+}
+
+/** The same errors as those of the loader, which reads files in parts. */
+function missingShard(number: number, from: number, total: number) {
+  const what = `the file should have ${total} bytes, and those from ${from} on are missing`;
+  const why = `either it was cut off, or it is in shards and \`${shardSuffix(number)}\`, as its name ends, is not there`;
+  return new TetralodError("truncated", `${what}: ${why}; copy it again, with all files whose names begin with its name`);
+}
+
+function wrongShard(number: number, found: number, expected: number) {
+  const what = `the shard \`${shardSuffix(number)}\`, as its name ends, has ${found} bytes instead of ${expected}`;
+  const why = "it was cut off, or belongs to another version of the file";
+  const remedy = "copy all files again whose names begin with the name of the first one";
+  return new TetralodError(found < expected ? "truncated" : "corrupt", `${what}: ${why}; ${remedy}`);
 }
 
 /** What takes the chunks of a source. */

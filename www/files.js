@@ -15,12 +15,13 @@ const START = [0x89, 0x54, 0x4c, 0x4f, 0x44, 0x0d, 0x0a, 0x1a];
 /**
  * Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of.
  *
- * @param {Dropped[]} files
+ * @param {Dropped[]} given
  * @param {boolean} isForBeside whether they are shown beside what is open
  */
-export async function takeFiles(files, isForBeside = source.isForBeside) {
-  if (files.length === 0) return;
+export async function takeFiles(given, isForBeside = source.isForBeside) {
+  if (given.length === 0) return;
   dialog("gallery").close();
+  const files = await joined(given);
   const [{ data }] = files;
   const isMt = files.every(({ name }) => /\.mt$/i.test(name)) || (files.length === 1 && (await beginsAsMt(data)));
   const show = (/** @type {File} */ file) => store.change({ beside: wordsOf(file) });
@@ -28,15 +29,47 @@ export async function takeFiles(files, isForBeside = source.isForBeside) {
   else takeMesh(files, (built) => (isForBeside ? show(built) : openBuilt(built, files)));
 }
 
-/** Whether the content says that it is an MT file. One that cannot be read is for whoever opens it. @param {File} file */
-async function beginsAsMt(file) {
-  const start = await file
-    .slice(0, START.length)
+/** The first bytes of a file; none of one that cannot be read, which is for whoever opens it. @param {File} file */
+const startOf = (file, count = START.length) =>
+  file
+    .slice(0, count)
     .arrayBuffer()
     .catch(() => new ArrayBuffer(0));
-  const bytes = new Uint8Array(start);
+
+/** Whether the content says that it is an MT file. @param {File} file */
+async function beginsAsMt(file) {
+  const bytes = new Uint8Array(await startOf(file));
   return START.every((byte, i) => byte === bytes[i]);
 }
+
+/** Shards of MT files, but for the first ones: `name.mt.0001`. */
+const SHARD = /\.mt\.\d{4,}$/i;
+
+/** The same files with each MT file in one, if it comes in shards. @param {Dropped[]} files @returns {Promise<Dropped[]>} */
+async function joined(files) {
+  const shards = new Map(files.filter(({ name }) => SHARD.test(name)).map((file) => [file.name, file]));
+  const whole = async (/** @type {Dropped} */ first) => {
+    const all = [first];
+    for (let next; (next = shards.get(shardName(first, all.length))); all.push(next)) shards.delete(next.name);
+    if (all.length === 1) return first;
+    const data = new File(
+      all.map((shard) => shard.data),
+      first.data.name,
+      { lastModified: Math.max(...all.map((shard) => shard.data.lastModified)) },
+    );
+    // Of how many bytes there are, the header tells at its place 16.
+    const start = await startOf(data, 24);
+    const missing = start.byteLength === 24 && data.size < Number(new DataView(start).getBigUint64(16, true));
+    if (missing) throw new Error(`${first.name}: ${shardName(first, all.length)} is missing, or one before it is cut off`);
+    return { name: first.name, data };
+  };
+  const found = await Promise.all(files.filter(({ name }) => !SHARD.test(name)).map(whole));
+  // What belongs to none of them is for whoever opens it.
+  return [...found, ...shards.values()];
+}
+
+/** @param {Dropped} first @param {number} number */
+const shardName = ({ name }, number) => `${name}.${String(number).padStart(4, "0")}`;
 
 /** @param {Iterable<File> | null | undefined} files @returns {Dropped[]} */
 const named = (files) => Array.from(files ?? [], (data) => ({ name: data.webkitRelativePath || data.name, data }));
@@ -73,7 +106,7 @@ export function attachFiles() {
   input("file").addEventListener("change", () => {
     const files = named(input("file").files);
     input("file").value = "";
-    takeFiles(files);
+    takeFiles(files).catch((error) => say("What was chosen cannot be read", error));
   });
   const carriesFile = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes("Files");
   window.addEventListener("dragover", (event) => {

@@ -1,9 +1,8 @@
 //! `tetralod bench`: how fast this machine is with an MT file, or at Delaunay triangulation.
 
-use super::output;
+use super::{files, output};
 use anyhow::{Context, Result};
 use serde::Serialize;
-use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
 use tetralod_bench as bench;
@@ -69,7 +68,15 @@ const RANDOM: usize = 100_000;
 pub fn run(arguments: &Arguments) -> Result<()> {
     let Some(file) = &arguments.file else { return run_delaunay(arguments) };
     let name = || file.display().to_string();
-    let bytes = fs::read(file).with_context(name)?;
+    let mut bytes = Vec::new();
+    files::Bytes::of(file)
+        .and_then(|source| {
+            source.read_all(|piece| {
+                bytes.extend_from_slice(piece);
+                Ok(())
+            })
+        })
+        .with_context(name)?;
     let start = Instant::now();
     let mut clock = || start.elapsed().as_secs_f64();
     let found = bench::run(&bytes, &mut clock, TIME).with_context(name)?;

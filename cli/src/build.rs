@@ -12,6 +12,7 @@ use super::output::Verbosity;
 use super::progress::with_progress;
 use super::remedies::failed;
 use super::restrictions::Angles;
+use super::shards::Sharding;
 use super::{extremes, files, input, machine, parse, parts};
 use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
@@ -44,6 +45,8 @@ pub struct Arguments {
     /// are powers of 1024. If nothing is said: the memory of the machine, of which half is for reading; nothing is parted.
     #[arg(long, value_name = "BYTES", value_parser = parse::parse_bytes)]
     memory: Option<u64>,
+    #[command(flatten)]
+    sharding: Sharding,
     #[command(flatten)]
     verbosity: Verbosity,
 }
@@ -107,7 +110,8 @@ fn finish(
     let Arguments { options, verbosity, output, .. } = arguments;
     let Some(output) = output else { return Err(anyhow!("-o FILE is missing")) };
     let BuildResult { mt, summary, exact, .. } = result;
-    let file_bytes = files::write_mt(output, &mt, exact, options.metadata(config))?;
+    let write = |path: &Path| files::write_mt(path, &mt, exact, options.metadata(config));
+    let file_bytes = arguments.sharding.write(output, write)?;
     let report = Report {
         kind: config.construction.kind().name(),
         method: config.construction.method().name(),
@@ -116,6 +120,7 @@ fn finish(
         regions: (!config.preserve.is_empty()).then(|| mt.regions().map_or(0, |regions| regions.all.len())),
         interface_deviation: (config.preserve_within > 0.0).then_some(summary.interface_deviation),
         file_bytes,
+        shards: arguments.sharding.count(file_bytes),
         bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
         seconds: start.elapsed().as_secs_f64(),
         averaged: mt.info().averaged_fields(),

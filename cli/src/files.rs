@@ -12,7 +12,7 @@ use std::time::Duration;
 use tetralod::format::{DecodeOptions, EncodeOptions, encode_to};
 use tetralod::mt::{Exact, Mt, MtInfo};
 use tetralod::session::{Client, Session};
-use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, Traffic, WantedRange};
+use tetralod::stream::{Arrived, FileSource, RangeSource, ShardedFile, StreamError, Traffic, WantedRange};
 use tetralod::stream::{HttpOptions, HttpSource};
 use tetralod_build::verify::Reference;
 use tetralod_build::{Construction, Method};
@@ -32,6 +32,12 @@ static PARTIAL: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 fn partial() -> MutexGuard<'static, Vec<PathBuf>> {
     // A path is whole even if a thread panicked while it held the lock.
     PARTIAL.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Does some work to its end, whenever Ctrl-C comes.
+pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
+    let _partial = partial();
+    work()
 }
 
 /// Makes Ctrl-C (and SIGTERM) end the program without leaving a partial file.
@@ -89,7 +95,7 @@ pub fn check_output<'a>(path: &Path, given: impl IntoIterator<Item = &'a PathBuf
 }
 
 /// Refuses an output that is one of the inputs, whoever named them. Pipes and devices are not replaced.
-fn check_inputs(path: &Path) -> Result<()> {
+pub fn check_inputs(path: &Path) -> Result<()> {
     let is_input = fs::canonicalize(path).is_ok_and(|place| place.is_file() && inputs().contains(&place));
     ensure!(
         !is_input,
@@ -171,7 +177,12 @@ pub fn write_mt(path: &Path, mt: &Mt, exact: Vec<Exact>, metadata: BTreeMap<Stri
 pub fn in_folder_beside<T>(path: &Path, work: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
     let folder = {
         let mut partial = partial();
-        let folder = beside(path).and_then(|(builder, folder)| Ok(builder.tempdir_in(folder)?));
+        let folder = beside(path).and_then(|(mut builder, folder)| {
+            // Folders are gone into.
+            #[cfg(unix)]
+            builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+            Ok(builder.tempdir_in(folder)?)
+        });
         let folder = folder.with_context(|| format!("no folder beside {} could be made", path.display()))?;
         partial.push(folder.path().to_owned());
         folder
@@ -364,6 +375,25 @@ impl Bytes {
         Self(Box::new(part))
     }
 
+    /// Hands on all bytes, one piece after the other; returns how many they are.
+    pub fn read_all(mut self, mut take: impl FnMut(&[u8]) -> Result<()>) -> Result<u64> {
+        let mut at = 0;
+        loop {
+            let range = at..at + CHUNK;
+            self.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
+            let bytes = loop {
+                if let Some((_, bytes)) = self.next(PATIENCE)? {
+                    break bytes;
+                }
+            };
+            take(&bytes)?;
+            at += bytes.len() as u64;
+            if at < range.end {
+                return Ok(at);
+            }
+        }
+    }
+
     /// Of a path, or of an address that begins with `http://` or `https://`.
     pub fn of(path: &Path) -> Result<Self> {
         if let Some(url) = url(path) {
@@ -375,11 +405,20 @@ impl Bytes {
             );
         }
         if fs::metadata(path)?.is_file() {
-            return Ok(Self(Box::new(FileSource::new(File::open(path)?)?)));
+            let shards = path.to_owned();
+            let open = move |suffix: &str| File::open(with_suffix(&shards, suffix));
+            return Ok(Self(Box::new(FileSource::new(ShardedFile::new(File::open(path)?, open)?)?)));
         }
         // Pipes cannot be sought in.
         Ok(Self(Box::new(FileSource::new(Cursor::new(fs::read(path)?))?)))
     }
+}
+
+/// A path with more behind its name.
+pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    name.into()
 }
 
 /// The address, if a path is one.
@@ -407,22 +446,21 @@ pub fn open_mt(path: &Path) -> Result<Opened> {
     Ok(Opened { session, bytes, read: bytes, traffic: None })
 }
 
-fn read_mt(mut source: Bytes) -> Result<Session> {
+fn read_mt(source: Bytes) -> Result<Session> {
     let mut session = Session::new();
-    let mut at = 0;
-    loop {
-        let range = at..at + CHUNK;
-        source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
-        let bytes = loop {
-            if let Some((_, bytes)) = source.next(PATIENCE)? {
-                break bytes;
-            }
-        };
-        session.feed(&bytes)?;
-        at += bytes.len() as u64;
-        if at < range.end {
-            session.finish()?;
-            return Ok(session);
-        }
-    }
+    source.read_all(|bytes| {
+        session.feed(bytes)?;
+        Ok(())
+    })?;
+    session.finish()?;
+    Ok(session)
+}
+
+/// Copies an MT file as it is; returns how many bytes that are.
+pub fn copy_mt(from: &Path, to: &Path) -> Result<u64> {
+    let source = Bytes::of(from).with_context(|| from.display().to_string())?;
+    write_file(to, |out| {
+        let copied = source.read_all(|bytes| Ok(out.write_all(bytes)?));
+        copied.with_context(|| from.display().to_string())
+    })
 }

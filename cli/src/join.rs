@@ -1,6 +1,7 @@
 //! `tetralod join`: parts that are built to one MT file.
 
 use super::output::{self, Verbosity};
+use super::shards::Sharding;
 use super::{build, extremes, files, parts};
 use anyhow::{Context, Result};
 use serde::Serialize;
@@ -24,6 +25,8 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE", required_unless_present = "node", conflicts_with = "node")]
     output: Option<PathBuf>,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     verbosity: Verbosity,
 }
 
@@ -33,6 +36,9 @@ struct Report {
     #[serde(flatten)]
     counts: BuildSummary,
     file_bytes: u64,
+    /// In how many shards the file is, if these were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shards: Option<u64>,
     /// How many regions the file has, if it has some.
     #[serde(skip_serializing_if = "Option::is_none")]
     regions: Option<usize>,
@@ -42,29 +48,31 @@ struct Report {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let Arguments { folder, node, output, verbosity } = arguments;
-    if let Some(node) = *node {
+    let &Arguments { ref folder, node, ref output, sharding, ref verbosity } = arguments;
+    if let Some(node) = node {
         return parts::join_node(folder, node, verbosity);
     }
     let output = output.as_ref().context("-o FILE is missing")?;
     files::check_ending(output, "mt")?;
-    finish(folder, output, verbosity)
+    finish(folder, output, sharding, verbosity)
 }
 
 /// Writes the MT file of all that has been built.
-pub fn finish(folder: &Path, output: &Path, verbosity: &Verbosity) -> Result<()> {
+pub fn finish(folder: &Path, output: &Path, sharding: Sharding, verbosity: &Verbosity) -> Result<()> {
     // All parts in the folder are read.
     let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let parts: Vec<PathBuf> = entries.filter(|path| files::ending(path) == "part").collect();
     files::check_output(output, &parts)?;
     let (BuildResult { mt, summary, exact, .. }, plan) = parts::assemble(folder, verbosity)?;
-    let file_bytes = files::write_mt(output, &mt, exact, plan.metadata().clone())?;
+    let write = |path: &Path| files::write_mt(path, &mt, exact, plan.metadata().clone());
+    let file_bytes = sharding.write(output, write)?;
+    let shards = sharding.count(file_bytes);
     let mut rows = vec![("file", output.display().to_string())];
     rows.extend(build::report::rows_of(&summary));
-    rows.push(("file size", output::bytes(file_bytes)));
+    rows.push(("file size", output::file_size(file_bytes, shards)));
     let regions = mt.regions().map(|regions| regions.all.len());
     rows.extend(regions.map(|count| ("regions", output::count(count as u32))));
     let averaged = mt.info().averaged_fields();
     rows.extend(extremes::rows(&averaged, extremes::size(mt.info())));
-    verbosity.print(&Report { counts: summary, file_bytes, regions, averaged }, &rows)
+    verbosity.print(&Report { counts: summary, file_bytes, shards, regions, averaged }, &rows)
 }

@@ -34,6 +34,7 @@ mod render;
 mod repair;
 mod restrictions;
 mod serve;
+mod shards;
 mod slice;
 mod stats;
 mod status;

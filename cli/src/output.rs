@@ -130,6 +130,14 @@ pub fn mesh(vertices: u32, tetrahedra: u32) -> String {
     format!("{} vertices, {} tetrahedra", count(vertices), count(tetrahedra))
 }
 
+/// The size of a file, for people, and in how many shards it is.
+pub fn file_size(size: u64, shards: Option<u64>) -> String {
+    match shards {
+        None | Some(1) => bytes(size),
+        Some(shards) => format!("{} in {} shards", bytes(size), count(shards)),
+    }
+}
+
 /// A size in bytes, for people.
 pub fn bytes(number: u64) -> String {
     let units = ["KiB", "MiB", "GiB", "TiB"];

@@ -132,6 +132,15 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
     if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too large")) }
 }
 
+/// A number of bytes that is large enough for a shard of a file, or `none`, which is more than any file has.
+pub fn parse_shard_size(text: &str) -> Result<u64, String> {
+    if text == "none" {
+        return Ok(u64::MAX);
+    }
+    let size = parse_bytes(text)?;
+    if size < 64 << 10 { Err(format!("'{text}' is less than 64K")) } else { Ok(size) }
+}
+
 /// A number that `fits`; `expected` says which do.
 pub fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> anyhow::Result<f64> {
     text.trim().parse().ok().filter(|x| fits(*x)).with_context(|| format!("it must be {expected}"))
@@ -163,5 +172,10 @@ mod tests {
             [Some(17), Some(2048), Some(3 << 19), Some(3 << 30), Some(1 << 20)]
         );
         assert_eq!(["", "K", "1T", "-1", "1e300G", "1 2"].map(read), [None; 6]);
+        let size = |text: &str| parse_shard_size(text).ok();
+        assert_eq!(
+            ["64K", "25M", "none", "63K", "0", "all"].map(size),
+            [Some(1 << 16), Some(25 << 20), Some(u64::MAX), None, None, None]
+        );
     }
 }

@@ -27,16 +27,33 @@ const nameOf = (/** @type {vscode.Uri} */ uri) => posix.basename(uri.path);
  * @typedef {(text: string) => void} Tell
  */
 
+/** How an MT file begins: the magic of its header. */
+const START = [0x89, 0x54, 0x4c, 0x4f, 0x44, 0x0d, 0x0a, 0x1a];
+
 /** A file of this machine, of which no more is in memory than what is asked for. @returns {Promise<Opened>} */
 async function onDisk(path) {
-  const handle = await open(path);
-  const { size } = await handle.stat();
+  const first = await open(path);
+  const { size } = await first.stat();
+  const header = new Uint8Array(24);
+  await first.read(header, 0, header.length, 0);
+  // An MT file may have more bytes than are in the file of its name: then the others are in its shards.
+  const isMt = START.every((byte, i) => header[i] === byte);
+  const total = isMt ? Math.max(size, Number(new DataView(header.buffer).getBigUint64(16, true))) : size;
+  const shards = [Promise.resolve(first)];
+  const shard = (number) => (shards[number] ??= open(`${path}.${String(number).padStart(4, "0")}`));
   const read = async (start, end) => {
     const bytes = new Uint8Array(end - start);
-    const { bytesRead } = await handle.read(bytes, 0, bytes.length, start);
-    return bytes.subarray(0, bytesRead);
+    for (let at = start; at < end; ) {
+      const number = total > size ? Math.floor(at / size) : 0;
+      const length = total > size ? Math.min(end, (number + 1) * size) - at : end - at;
+      const { bytesRead } = await (await shard(number)).read(bytes, at - start, length, at - number * size);
+      if (bytesRead < length) return bytes.subarray(0, at - start + bytesRead);
+      at += length;
+    }
+    return bytes;
   };
-  return { size, read, close: () => handle.close() };
+  const close = () => shards.forEach((opened) => opened?.then((handle) => handle.close()).catch(() => {}));
+  return { size: total, read, close };
 }
 
 /** Copies go to the page: with a part of an array, VS Code would send all of it. @returns {Opened} */

@@ -10,7 +10,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tetralod::stream::{
-    Arrived, CacheFolder, FileSource, HttpOptions, HttpSource, RangeSource, StreamError, Traffic, WantedRange,
+    Arrived, CacheFolder, FileSource, HttpOptions, HttpSource, RangeSource, ShardedFile, StreamError,
+    Traffic, WantedRange,
 };
 
 /// How long is waited at a time before Python is asked whether to go on.
@@ -101,7 +102,15 @@ impl Source {
             Given::Bytes(bytes) => Box::new(FileSource::new(Cursor::new(bytes))?),
             Given::Path(path) => match url(&path) {
                 Some(url) => Box::new(HttpSource::new(url, network.options())),
-                None => Box::new(FileSource::new(File::open(&path).map_err(unreadable)?)?),
+                None => {
+                    let first = File::open(&path).map_err(unreadable)?;
+                    let open = move |suffix: &str| {
+                        let mut name = path.clone().into_os_string();
+                        name.push(suffix);
+                        File::open(name)
+                    };
+                    Box::new(FileSource::new(ShardedFile::new(first, open).map_err(unreadable)?)?)
+                }
             },
         };
         Ok(Self { inner, interrupt: Arc::clone(interrupt) })

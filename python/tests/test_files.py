@@ -80,6 +80,22 @@ def test_what_is_no_file_is_said(served, tmp_path):
     assert caught.value.code == "corrupt"
 
 
+def test_a_file_in_shards_is_read_as_one(served):
+    path, address = served
+    cut = path.with_name("cut.mt")
+    command("convert", path, "--shard-size", "64K", "-o", cut, "--quiet")
+    finest = tetralod.open(path).refine(error=0)
+    for source in (cut, f"{address}/cut.mt"):
+        with tetralod.open(source) as mt:
+            assert mt.info.file_bytes == path.stat().st_size > cut.stat().st_size
+            assert mt.refine(error=0).stats.hash == finest.stats.hash
+    path.with_name("cut.mt.0002").unlink()
+    for source in (cut, f"{address}/cut.mt"):
+        with pytest.raises(tetralod.TetralodError, match=re.escape("`.0002`")) as caught:
+            tetralod.open(source).refine(error=0)
+        assert caught.value.code == "truncated"
+
+
 def test_memory_limits_what_is_kept(served):
     path, _ = served
     mesh = tetralod.open(path, memory=20_000).refine(error=0)

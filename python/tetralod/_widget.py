@@ -66,7 +66,8 @@ class Viewer(anywidget.AnyWidget):
         data, name, network = mt._source()
         self.mt = mt
         self._ranges: _native.Ranges | None = _native.Ranges(data, name, network)
-        self._ranges.read(0, 1)
+        # With its header, which says how long a file in shards is.
+        self._ranges.read(0, 32)
         size = self._ranges.size()
         if size is None:
             raise TetralodError("server", f"{name}: the server does not tell the size of the file")

@@ -82,6 +82,11 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
     })
 }
 
+/// How many bytes a file has, if its first ones are a header that says so.
+pub fn stated_bytes(start: &[u8]) -> Option<u64> {
+    parse_header(start.first_chunk()?).ok()?.total
+}
+
 /// The first four bytes as a number. The callers have them.
 fn u32_of(bytes: &[u8]) -> u32 {
     u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])

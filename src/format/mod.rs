@@ -29,6 +29,7 @@ pub use encode::{encode, encode_to};
 pub use encode_error::EncodeError;
 pub use encode_options::EncodeOptions;
 pub use error::FormatError;
+pub(crate) use header::{HEADER_BYTES, stated_bytes};
 pub use limits::Limits;
 #[doc(hidden)]
 pub use payload::exact::Corrections;

@@ -48,6 +48,32 @@ pub enum StreamError {
         "the file on the server was replaced while it was being read; open it again, and give new versions new names"
     )]
     Changed,
+    /// The file ends where more should follow: it was cut off, or it is in shards, and one of them is not there.
+    #[error(
+        "the file should have {total} bytes, and those from {from} on are missing: either it was cut off, or it is in shards and `{suffix}`, \
+         as its name ends, is not there; copy it again, with all files whose names begin with its name"
+    )]
+    MissingShard {
+        /// What stands behind the name of the file in that of the shard which was looked for.
+        suffix: String,
+        /// Where the shard begins.
+        from: u64,
+        /// The length of the whole file, by its header.
+        total: u64,
+    },
+    /// A shard of the file has another length than it must have.
+    #[error(
+        "the shard `{suffix}`, as its name ends, has {found} bytes instead of {expected}: it was cut off, or belongs to another version of \
+         the file; copy all files again whose names begin with the name of the first one"
+    )]
+    WrongShard {
+        /// What stands behind the name of the file in that of the shard.
+        suffix: String,
+        /// Its bytes.
+        found: u64,
+        /// The bytes that it must have.
+        expected: u64,
+    },
     /// A file on this machine cannot be read.
     #[error("the file cannot be read ({0})")]
     Unreadable(String),
@@ -59,7 +85,13 @@ impl StreamError {
         match self {
             Self::Status(status) => matches!(status, 408 | 425 | 429 | 500..),
             Self::Network(_) | Self::Timeout | Self::WrongRange(_) => true,
-            Self::Blocked | Self::WebPage | Self::Encoded(_) | Self::Changed | Self::Unreadable(_) => false,
+            Self::Blocked
+            | Self::WebPage
+            | Self::Encoded(_)
+            | Self::Changed
+            | Self::MissingShard { .. }
+            | Self::WrongShard { .. }
+            | Self::Unreadable(_) => false,
         }
     }
 }
@@ -83,6 +115,9 @@ impl crate::Coded for StreamError {
             Self::Blocked => "cors",
             Self::Changed => "changed",
             Self::WebPage | Self::Encoded(_) | Self::WrongRange(_) => "server",
+            Self::MissingShard { .. } => "truncated",
+            Self::WrongShard { found, expected, .. } if found < expected => "truncated",
+            Self::WrongShard { .. } => "corrupt",
             Self::Unreadable(_) => "network",
         }
     }

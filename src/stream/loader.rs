@@ -1,6 +1,7 @@
 //! Decides which bytes to ask for next, and takes what comes.
 
 use super::error::StreamError;
+use super::objects::Objects;
 use super::range_set::RangeSet;
 use super::reassembly::Reassembly;
 use super::response::{ResponseContent, ResponseHead, UNKNOWN};
@@ -66,7 +67,9 @@ pub enum Action {
     Fetch {
         /// The number by which the driver reports about the request.
         id: u32,
-        /// The bytes.
+        /// The shard of the file that is to be asked for them; 0 if it is in one object, as most are.
+        shard: u64,
+        /// The bytes, by their places in that shard.
         range: Range<u64>,
         /// For `If-Match`, where sending that costs nothing (in a page it costs a preflight); answers are checked anyway.
         if_match: Option<String>,
@@ -143,7 +146,9 @@ pub struct Loader {
     requests: Vec<Request>,
     pauses: Vec<Pause>,
     cancelled: Vec<u32>,
-    file: Version,
+    file: Objects,
+    /// Whether the length of the first object is to be found out by a request of its own.
+    measures: Measures,
     pace: Pace,
     /// Whether the server has answered with a range, or with the whole file instead.
     ranges: Option<bool>,
@@ -156,10 +161,34 @@ pub struct Loader {
     last_id: u32,
 }
 
+/// Where it is not to be seen how long an object is, as of servers elsewhere in most pages, a header that promises more than there is leads
+/// here: a request for all of it has an answer whose length is that of the object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Measures {
+    #[default]
+    Unneeded,
+    Due,
+    Done,
+}
+
+/// What is to be asked for next.
+#[derive(Debug)]
+struct Chosen {
+    range: Range<u64>,
+    /// Tries before it that brought nothing.
+    strikes: u32,
+    /// Whether it is asked for to learn the length of the object.
+    measures: bool,
+}
+
 /// A request under way.
 #[derive(Debug)]
 struct Request {
     id: u32,
+    /// The shard that is asked, and where it begins in the file.
+    shard: u64,
+    base: u64,
+    measures: bool,
     asked: Range<u64>,
     /// The next byte of the body, and its end.
     body: Range<u64>,
@@ -178,51 +207,9 @@ struct Request {
 #[derive(Debug)]
 struct Pause {
     range: Range<u64>,
+    measures: bool,
     strikes: u32,
     until: u64,
-}
-
-/// What distinguishes one version of the file from another.
-#[derive(Debug, Default)]
-struct Version {
-    total: Option<u64>,
-    /// No byte from here on, as far as is known without `total`.
-    end: Option<u64>,
-    etag: Option<String>,
-    modified: Option<String>,
-}
-
-impl Version {
-    fn end(&self) -> u64 {
-        self.total.or(self.end).unwrap_or(UNKNOWN)
-    }
-
-    /// `range` without what lies beyond the end.
-    fn clip(&self, range: &Range<u64>) -> Range<u64> {
-        let end = self.end();
-        range.start.min(end)..range.end.min(end)
-    }
-
-    /// Takes over what is in `head`; an error if that is of another version.
-    fn learn(&mut self, head: &ResponseHead) -> Result<(), StreamError> {
-        agree(&mut self.total, head.total())?;
-        let tag = head.strong_etag();
-        let same = tag.is_some() && tag == self.etag.as_deref();
-        agree(&mut self.etag, tag.map(str::to_owned))?;
-        // Servers behind one address may disagree in the date of the same bytes.
-        if same { Ok(()) } else { agree(&mut self.modified, head.last_modified.map(str::to_owned)) }
-    }
-}
-
-fn agree<T: PartialEq>(known: &mut Option<T>, found: Option<T>) -> Result<(), StreamError> {
-    match (&known, found) {
-        (_, None) => Ok(()),
-        (Some(known), Some(found)) => (*known == found).then_some(()).ok_or(StreamError::Changed),
-        (None, found) => {
-            *known = found;
-            Ok(())
-        }
-    }
 }
 
 /// How soon answers begin, and how fast they come then, as far as is known.
@@ -311,10 +298,7 @@ impl Loader {
         self.wanted = wanted.to_vec();
         let ready = &self.ready;
         self.wanted.retain(|wanted| ready.iter().all(|(range, _)| *range != wanted.range));
-        self.needed = self.all_wanted();
-        for range in self.reassembly.ranges() {
-            self.needed.remove(&range);
-        }
+        self.find_needed();
         self.drop_spare();
         self.deliver(&(0..UNKNOWN));
     }
@@ -337,8 +321,8 @@ impl Loader {
             self.reading.push(range.clone());
             return Some(Action::Read { range });
         }
-        if let Some((range, strikes)) = self.choose(now_ms) {
-            return Some(self.fetch(range, strikes, now_ms));
+        if let Some(chosen) = self.choose(now_ms) {
+            return Some(self.fetch(chosen, now_ms));
         }
         let deadlines = self.requests.iter().map(|request| request.deadline);
         let until_ms = deadlines.chain(self.pauses.iter().map(|pause| pause.until)).min()?;
@@ -352,20 +336,38 @@ impl Loader {
         request.deadline = now_ms.saturating_add(self.options.timeout_ms);
         (request.answered, request.headed) = (true, now_ms);
         self.pace.note_latency(now_ms.saturating_sub(request.made));
-        let judged = head.judge(&request.asked);
-        let judged = judged.and_then(|answer| self.file.learn(head).map(|()| answer));
+        let (shard, base) = (request.shard, request.base);
+        let judged = head.judge(&(request.asked.start - base..request.asked.end - base));
+        let judged = judged.and_then(|answer| self.file.learn(shard, head).map(|()| answer));
+        if judged.is_ok() {
+            self.look_for_shards();
+        }
         match judged {
-            Ok(ResponseContent::Part(part)) => {
-                self.requests[at].body = part;
-                self.ranges = Some(true);
-                self.end_at(self.file.end());
+            Ok(ResponseContent::Part(part)) if self.requests[at].measures => {
+                let request = self.requests.swap_remove(at);
+                // The rest of it is asked for as it is needed.
+                self.cancelled.push(id);
+                if part.end < request.asked.end {
+                    self.learn_length(part.end);
+                }
             }
-            Ok(ResponseContent::Whole(end)) => self.take_whole(at, end),
+            Ok(ResponseContent::Part(part)) => {
+                self.requests[at].body = base + part.start..base + part.end;
+                self.ranges = Some(true);
+                self.settle_end();
+            }
+            Ok(ResponseContent::Whole(end)) => self.take_whole(at, base.saturating_add(end)),
             Ok(ResponseContent::Beyond(end)) => {
-                self.requests.swap_remove(at);
+                let request = self.requests.swap_remove(at);
                 // Its body, if any, says nothing.
                 self.cancelled.push(id);
-                self.end_at(end);
+                if self.awaits_header() && request.asked.start > 0 {
+                    // Then it is known where this is.
+                    let error = StreamError::WrongRange("nothing, before its beginning has come".to_owned());
+                    self.stumble(request, error, now_ms, 0);
+                } else {
+                    self.go_beyond(&request, end);
+                }
             }
             Err(error) => {
                 let request = self.requests.swap_remove(at);
@@ -395,6 +397,7 @@ impl Loader {
         self.traffic.repeated += taken as u64 - new;
         self.requests[at].used += used;
         self.traffic.used += used;
+        self.take_start(start, &bytes[..taken]);
         if done {
             self.finish(at, now_ms);
             if taken < bytes.len() {
@@ -411,11 +414,7 @@ impl Loader {
         let Some(at) = self.position(id) else { return };
         let request = self.requests.swap_remove(at);
         if request.answered && request.body.end == UNKNOWN {
-            let end = request.body.start;
-            match agree(&mut self.file.total, Some(end)) {
-                Ok(()) => self.end_at(end),
-                Err(error) => self.fail(error),
-            }
+            self.learn_length(request.body.start);
         } else {
             self.stumble(request, StreamError::Network("an answer ended too early".to_owned()), now_ms, 0);
         }
@@ -450,6 +449,7 @@ impl Loader {
         self.reading.retain(|reading| reading != range);
         let there = range.start..range.end.min(range.start.saturating_add(bytes.len() as u64));
         self.store(&there, bytes);
+        self.take_start(range.start, bytes);
         self.deliver(range);
     }
 
@@ -490,7 +490,7 @@ impl Loader {
     pub fn retry(&mut self) {
         self.forget_cached();
         if self.error.take() == Some(StreamError::Changed) {
-            self.file = Version::default();
+            (self.file, self.measures) = (Objects::default(), Measures::default());
             self.reassembly = Reassembly::default();
             self.came = RangeSet::default();
             self.needed = self.all_wanted();
@@ -499,12 +499,12 @@ impl Loader {
 
     /// The size of the file, once it is known.
     pub fn total(&self) -> Option<u64> {
-        self.file.total
+        self.file.total()
     }
 
     /// What names this version of the file: its strong entity tag or, failing that, its date.
     pub fn version(&self) -> Option<&str> {
-        self.file.etag.as_deref().or(self.file.modified.as_deref())
+        self.file.version()
     }
 
     /// Whether the server gives ranges; where it does not, everything passes by from the start for whatever is wanted.
@@ -542,6 +542,88 @@ impl Loader {
 
     fn all_wanted(&self) -> RangeSet {
         RangeSet::of(self.wanted.iter().map(|wanted| self.file.clip(&wanted.range)).collect())
+    }
+
+    /// Notes which bytes are wanted and not held.
+    fn find_needed(&mut self) {
+        self.needed = self.all_wanted();
+        for range in self.reassembly.ranges() {
+            self.needed.remove(&range);
+        }
+    }
+
+    /// The bytes at a place have come: they may be those of the header, which says whether the file goes on in other shards.
+    fn take_start(&mut self, at: u64, bytes: &[u8]) {
+        let rest = self.file.rest_of_header();
+        if rest.is_empty() || at > rest.start {
+            return;
+        }
+        self.file.take_start(at, bytes);
+        self.look_for_shards();
+        self.settle_end();
+    }
+
+    /// There are no bytes beyond the end of the file, as it is known now; unless its header is on its way, which may say otherwise.
+    fn settle_end(&mut self) {
+        if !self.awaits_header() {
+            self.end_at(self.file.end());
+        }
+    }
+
+    /// Whether the header of the file is wanted, and has not come.
+    fn awaits_header(&self) -> bool {
+        let rest = self.file.rest_of_header();
+        self.needed.first_in(&rest).is_some_and(|next| next.start == rest.start)
+    }
+
+    /// Sees that the file is in shards, if it shows now: then there is more of it to be needed.
+    fn look_for_shards(&mut self) {
+        if self.file.find_shards() {
+            self.find_needed();
+        }
+    }
+
+    /// The first object has so many bytes.
+    fn learn_length(&mut self, length: u64) {
+        match self.file.learn_length(length) {
+            Ok(()) => {
+                self.look_for_shards();
+                self.end_at(self.file.end());
+            }
+            Err(error) => self.fail(error),
+        }
+    }
+
+    /// An object has no bytes where it was asked for them: it ends at `end`, by its own count.
+    fn go_beyond(&mut self, request: &Request, end: u64) {
+        let shards = self.file.shards();
+        match shards {
+            Some(shards) if request.shard > 0 => match shards.check(request.shard, end) {
+                Ok(()) => self.fail(StreamError::Changed),
+                Err(error) => self.fail(error),
+            },
+            // It was asked for before the file was known to be in shards.
+            Some(shards) if shards.number_at(request.asked.start) > 0 => {}
+            Some(_) => self.fail(StreamError::Changed),
+            None if self.measures == Measures::Unneeded
+                && self.file.stated().is_some_and(|total| request.asked.start < total) =>
+            {
+                self.measures = Measures::Due;
+            }
+            None => self.end_at(end),
+        }
+    }
+
+    /// What an error is if it was not the file itself that was asked for, but a shard of it.
+    fn error_of(&self, shard: u64, error: StreamError) -> StreamError {
+        match (self.file.shards(), &error) {
+            (
+                Some(shards),
+                // Servers that list nothing refuse what is not there, others send a page; and an error may lack what lets a page read it.
+                StreamError::Status(403 | 404 | 410) | StreamError::WebPage | StreamError::Blocked,
+            ) if shard > 0 => shards.missing(shard),
+            _ => error,
+        }
     }
 
     /// Keeps of `chunk` what is wanted and not held, and what has not come before; says how much was wanted, and how much had not come.
@@ -626,26 +708,26 @@ impl Loader {
 
     /// There are no bytes from `end` on.
     fn end_at(&mut self, end: u64) {
-        if self.file.total.is_none() {
-            self.file.end = Some(end.min(self.file.end()));
-        }
+        self.file.end_at(end);
         self.needed.remove(&(self.file.end()..UNKNOWN));
         self.deliver(&(0..UNKNOWN));
     }
 
-    /// The server sends all of the file: one request is enough.
+    /// The server sends all of an object: one request is enough.
     fn take_whole(&mut self, at: usize, end: u64) {
         self.ranges = Some(false);
         let mut request = self.requests.swap_remove(at);
-        let end = end.min(self.file.end());
-        request.body = 0..end;
+        let object = self.file.range(request.shard);
+        request.body = request.base..end.min(object.end);
         self.cancelled.extend(self.requests.drain(..).map(|other| other.id));
         self.pauses.clear();
-        if end > 0 {
+        let (is_last, end) = (object.end == self.file.end(), request.body.end);
+        if end > request.base {
             self.requests.push(request);
         }
-        if end != UNKNOWN {
-            self.end_at(end);
+        if end != UNKNOWN && is_last {
+            self.file.end_at(end);
+            self.settle_end();
         }
     }
 
@@ -661,39 +743,54 @@ impl Loader {
     /// Drops requests that bring nothing more that is wanted. Pauses stay for their time: a list that changes often
     /// must not make a client ask a server in trouble more often.
     fn drop_useless(&mut self, now: u64) {
-        let Self { requests, needed, cancelled, pauses, .. } = self;
+        let Self { requests, needed, cancelled, pauses, measures, .. } = self;
         requests.retain(|request| {
             let useful = needed.first_in(&request.body).is_some();
             if !useful {
                 cancelled.push(request.id);
+                if request.measures {
+                    *measures = Measures::Unneeded;
+                }
             }
             useful
         });
         pauses.retain(|pause| pause.until > now || needed.first_in(&pause.range).is_some());
     }
 
-    /// The next range to ask for, with the tries behind it.
-    fn choose(&mut self, now: u64) -> Option<(Range<u64>, u32)> {
+    /// The next range to ask for.
+    fn choose(&mut self, now: u64) -> Option<Chosen> {
         while let Some(due) = self.pauses.iter().position(|pause| pause.until <= now) {
-            let pause = self.pauses.swap_remove(due);
-            if let Some(range) = self.plan(Some(&pause.range)) {
-                return Some((range, pause.strikes));
+            let Pause { range, measures, strikes, .. } = self.pauses.swap_remove(due);
+            let range = if measures { Some(range) } else { self.plan(Some(&range)) };
+            if let Some(range) = range {
+                return Some(Chosen { range, strikes, measures });
             }
         }
         // Until the server has shown that it gives ranges, several requests might fetch the file several times.
         let most = if self.ranges == Some(true) { self.options.max_requests.max(1) } else { 1 };
         let room = self.requests.len() + self.pauses.len() < most;
-        if room { self.plan(None).map(|range| (range, 0)) } else { None }
+        if !room {
+            return None;
+        }
+        if let (Measures::Due, Some(total), Some(_)) = (self.measures, self.file.stated(), self.needed.hull())
+        {
+            self.measures = Measures::Done;
+            return Some(Chosen { range: 0..total, strikes: 0, measures: true });
+        }
+        self.plan(None).map(|range| Chosen { range, strikes: 0, measures: false })
     }
 
     /// The range to ask for: of what is in `within`, or from the most important bytes on.
     fn plan(&self, within: Option<&Range<u64>>) -> Option<Range<u64>> {
         let mut free = self.needed.clone();
+        free.remove(&(self.file.end()..UNKNOWN));
         for range in self.under_way() {
             free.remove(&range);
         }
         if self.ranges == Some(false) {
-            return free.hull();
+            let mut all = free.hull()?;
+            all.end = all.end.min(self.file.range(self.file.object_at(all.start)).end);
+            return Some(all);
         }
         let first = match within {
             Some(range) => free.first_in(range),
@@ -722,7 +819,7 @@ impl Loader {
         let request = self.requests.swap_remove(at);
         let bytes = request.body.end.saturating_sub(request.asked.start);
         self.pace.note_rate(bytes, now.saturating_sub(request.headed));
-        if request.body.end < request.asked.end.min(self.file.end()) {
+        if request.body.end < request.asked.end.min(self.file.range(request.shard).end) {
             // Allowed, but a server that gives a few bytes each time gets us nowhere.
             self.stumble(request, StreamError::WrongRange("a small part of it".to_owned()), now, 0);
         }
@@ -738,11 +835,12 @@ impl Loader {
 
     /// The range from `start` over what is free, and over gaps that are small, not on their way, and have not come before.
     ///
-    /// It grows backwards only by what comes within a wait: that comes before the most important bytes.
+    /// It grows backwards only by what comes within a wait: that comes before the most important bytes. It stays within one shard.
     fn grown(&self, start: u64, free: &RangeSet) -> Range<u64> {
         let Plan { gap, most, before } = self.pace.plan(&self.options, free, self.needed.len());
         let is_bridged = |between: Range<u64>| between.end - between.start <= gap && !self.is_busy(&between);
-        let limit = start.saturating_add(most);
+        let object = self.file.range(self.file.object_at(start));
+        let limit = start.saturating_add(most).min(object.end);
         let mut grown = start..start;
         while let Some(next) = free.first_in(&(grown.end..limit)) {
             if !is_bridged(grown.end..next.start) {
@@ -751,6 +849,7 @@ impl Loader {
             grown.end = next.end;
         }
         let first = start.saturating_sub(before.min(most.saturating_sub(grown.end - grown.start)));
+        let first = first.max(object.start);
         while let Some(last) = free.last_in(&(first..grown.start)) {
             if !is_bridged(last.end..grown.start) {
                 break;
@@ -765,16 +864,21 @@ impl Loader {
         self.came.first_in(gap).is_some() || busy.any(|range| range.start < gap.end && gap.start < range.end)
     }
 
-    fn fetch(&mut self, range: Range<u64>, strikes: u32, now: u64) -> Action {
+    fn fetch(&mut self, Chosen { range, strikes, measures }: Chosen, now: u64) -> Action {
         self.last_id = self.last_id.wrapping_add(1);
         let id = self.last_id;
         let deadline = now.saturating_add(self.options.timeout_ms);
+        let shard = self.file.object_at(range.start);
+        let base = self.file.range(shard).start;
         let (asked, body) = (range.clone(), range.clone());
         let (made, headed) = (now, now);
         self.traffic.rounds += u64::from(self.waiting_since.is_none());
         self.waiting_since.get_or_insert(now);
         self.requests.push(Request {
             id,
+            shard,
+            base,
+            measures,
             asked,
             body,
             answered: false,
@@ -785,7 +889,8 @@ impl Loader {
             deadline,
         });
         self.traffic.requests += 1;
-        Action::Fetch { id, range, if_match: self.file.etag.clone() }
+        let if_match = self.file.etag(shard).map(str::to_owned);
+        Action::Fetch { id, shard, range: range.start - base..range.end - base, if_match }
     }
 
     /// Deals with a request that failed: its rest is asked for again, at once if it had got on, else after a while.
@@ -793,13 +898,14 @@ impl Loader {
         let enough = (16 << 10).min((request.asked.end - request.asked.start) / 8).max(1);
         let strikes = if request.used >= enough { 0 } else { request.strikes + 1 };
         if strikes > self.options.retries || !error.may_pass() {
-            return self.fail(error);
+            return self.fail(self.error_of(request.shard, error));
         }
         let wait = if strikes == 0 { 0 } else { self.backoff(strikes).max(at_least_ms.min(60_000)) };
         // Of a whole file the beginning has passed by, but only the wanted part of it is held.
         let range =
             if self.ranges == Some(false) { 0..UNKNOWN } else { request.body.start..request.asked.end };
-        self.pauses.push(Pause { range, strikes, until: now.saturating_add(wait) });
+        let (measures, until) = (request.measures, now.saturating_add(wait));
+        self.pauses.push(Pause { range, measures, strikes, until });
     }
 
     /// Twice as long for each strike, and up to half of that less by chance.

@@ -101,7 +101,8 @@ impl<R: Read + Seek> FileSource<R> {
 }
 
 fn unreadable(error: std::io::Error) -> StreamError {
-    StreamError::Unreadable(error.to_string())
+    // Readers of several files say themselves what is wrong with them.
+    error.downcast().unwrap_or_else(|error| StreamError::Unreadable(error.to_string()))
 }
 
 impl<R: Read + Seek> RangeSource for FileSource<R> {

@@ -46,7 +46,7 @@ const ELSEWHERE = {
   "docs/command.md": ["sh: `release` of xtask compiles the command with the page; cli/tests/command/html.rs makes pages"],
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
-  "docs/hosting.md": ["sh: needs an account of S3"],
+  "docs/hosting.md": ["sh: needs an account of S3; cli/tests/command/shards.rs writes shards"],
   "docs/howto/cluster.md": [
     "sh: needs a cluster; `cargo xtask test workflows` runs Snakemake and the script for Slurm here, cli/tests/command/work.rs workers",
     "dockerfile: needs a registry",

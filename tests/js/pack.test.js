@@ -27,6 +27,7 @@ const SCRIPTS = [
   "parts",
   "ranges",
   "rpc",
+  "shards",
   "start",
   "stored",
   "stream",

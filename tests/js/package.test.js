@@ -1,8 +1,10 @@
 // The built package in Node, on the small MT that `cargo xtask test` makes: TETRALOD_FIXTURE is its folder.
 import assert from "node:assert/strict";
 import { createReadStream } from "node:fs";
-import { readFile } from "node:fs/promises";
+import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { createServer } from "node:http";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
 import { after, before, describe, test } from "node:test";
 import { pathToFileURL } from "node:url";
 import { MultiTessellation, TetralodError, absolute } from "../../pkg/index.js";
@@ -15,6 +17,12 @@ const path = `${folder}/small.mt`;
 const bytes = new Uint8Array(await readFile(path));
 const cases = JSON.parse(await readFile(`${folder}/hashes.json`, "utf8"));
 
+/** The same file in three shards. */
+const size = Math.ceil(bytes.length / 3);
+const shards = [0, 1, 2].map((number) => bytes.subarray(number * size, (number + 1) * size));
+const inShards = join(await mkdtemp(join(tmpdir(), "tetralod-")), "small.mt");
+for (const [number, shard] of shards.entries()) await writeFile(`${inShards}${number ? `.000${number}` : ""}`, shard);
+
 /** A server whose answers the tests choose; `held` answers stay open until they are released. */
 let server;
 let base;
@@ -24,6 +32,9 @@ before(async () => {
   server = createServer((request, response) => {
     const { pathname } = new URL(request.url, "http://x");
     if (pathname === "/good") return response.writeHead(200, { "content-length": bytes.length }).end(bytes);
+    const [, name, number = "0"] = /^\/(sharded|gap|short)\.mt(?:\.(\d{4}))?$/.exec(pathname) ?? [];
+    const found = name && pathname !== "/gap.mt.0001" && shards[Number(number)];
+    if (found) return response.writeHead(200).end(pathname === "/short.mt.0001" ? found.subarray(0, -1) : found);
     if (pathname === "/page") return response.writeHead(200).end("<!doctype html><title>oops</title>");
     if (pathname === "/breaks") {
       response.writeHead(200, { "content-length": bytes.length });
@@ -46,6 +57,7 @@ before(async () => {
 after(() => {
   server.closeAllConnections();
   server.close();
+  return rm(dirname(inShards), { recursive: true });
 });
 
 /** The area of triangles. */
@@ -97,6 +109,8 @@ for (const worker of [true, false]) {
         "a URL as text": `${base}/good`,
         "a URL": new URL(`${base}/good`),
         "a file URL": pathToFileURL(path),
+        "a URL of shards": `${base}/sharded.mt?key`,
+        "a file URL of shards": pathToFileURL(inShards),
         "a request": new Request(`${base}/good`),
         // Asked for when it is read: the server does not wait for who does not read.
         "a response": () => fetch(`${base}/good`),
@@ -385,6 +399,15 @@ for (const worker of [true, false]) {
       assert.ok((await mt.refine({ error: 0 }, { partial: true })).stats.tetrahedra > 0);
       await rejects(mt.refine({ error: 0 }), "network", /\/breaks/);
       mt.free();
+
+      for (const name of ["gap", "short"]) {
+        const opened = open(`${base}/${name}.mt`);
+        await rejects(
+          opened.then((mt) => mt.complete.finally(() => mt.free())),
+          "truncated",
+          new RegExp(`${name}\\.mt: .*\\.0001`),
+        );
+      }
 
       const cut = await open(bytes.slice(0, bytes.length - 5));
       await rejects(cut.complete, "truncated");

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
 import { after, before, test } from "node:test";
-import { gzipSync } from "node:zlib";
+import { crc32, gzipSync } from "node:zlib";
 import { loadCore } from "../../pkg/core.js";
 import { Ranges } from "../../pkg/ranges.js";
 import { RangeLoader } from "../../pkg/tetralod_core.js";
@@ -325,6 +325,65 @@ test("what is wanted no longer is cancelled, and nothing comes after the end", a
   ranges.close();
   ranges.go();
   assert.equal(ranges.total, undefined);
+});
+
+/** The file with a header that says how long it is. */
+const headed = file.slice();
+headed.set([0x89, 0x54, 0x4c, 0x4f, 0x44, 0x0d, 0x0a, 0x1a, 2, 0, 0, 0, 0, 0, 0, 0]);
+headed.fill(0, 16, 28);
+new DataView(headed.buffer).setUint32(16, SIZE, true);
+new DataView(headed.buffer).setUint32(28, crc32(headed.subarray(0, 28)), true);
+
+/** Answers with shards of so many bytes; `told` says whether the server tells how long they are, `missing` which is not there. */
+function inShards(size, { told = true, ranges = true, missing = -1 } = {}) {
+  return ({ start, end, path }, response) => {
+    const number = Number(/\.mt(?:\.(\d{4}))?$/.exec(path)?.[1] ?? 0);
+    const shard = headed.subarray(number * size, (number + 1) * size);
+    if (shard.length === 0 || number === missing) return response.writeHead(404).end();
+    if (!ranges) return response.writeHead(200, { "content-length": shard.length }).end(shard);
+    const total = told ? { "content-range": `bytes */${shard.length}` } : {};
+    if (start >= shard.length) return response.writeHead(416, total).end();
+    const part = shard.subarray(start, end);
+    const place = told ? { "content-range": `bytes ${start}-${start + part.length - 1}/${shard.length}` } : {};
+    response.writeHead(206, { ...place, "content-length": part.length }).end(part);
+  };
+}
+
+test("a file in shards comes as one, whatever the server tells of them", async () => {
+  for (const size of [70_000, 150_000, SIZE - 1, SIZE]) {
+    for (const server of [{}, { told: false }, { ranges: false }]) {
+      answer = inShards(size, server);
+      asked = [];
+      const { got, ranges } = await fetchAll(WANTED, { open: true }, `${base}?${++round}`);
+      const what = `${size} ${JSON.stringify(server)}`;
+      for (const [start, end, bytes] of got) assert.deepEqual(bytes, headed.slice(start, end), `${what}: ${start} to ${end}`);
+      assert.equal(ranges.total, SIZE, what);
+      ranges.close();
+      // The shards that are needed, and one request at most to learn that there are some, and how long they are.
+      const paths = new Set(asked.map(({ path }) => path));
+      assert.deepEqual(
+        [...paths].sort(),
+        Array.from({ length: Math.ceil(SIZE / size) }, (_, i) => `/file.mt${i ? `.000${i}` : ""}`),
+        what,
+      );
+      assert.ok(asked.length <= 16, `${what}: ${asked.length} requests`);
+    }
+  }
+});
+
+test("a shard that is missing or has another length is named", async () => {
+  const fails = (handler, options) => {
+    answer = handler;
+    return fetchAll(WANTED, options, `${base}?${++round}`).then(assert.fail, (error) => [error.code, /`(\.\d+)`/.exec(error.message)?.[1]]);
+  };
+  assert.deepEqual(await fails(inShards(70_000, { missing: 2 })), ["truncated", ".0002"]);
+  assert.deepEqual(await fails(inShards(70_000, { missing: 1, told: false })), ["truncated", ".0001"]);
+  const short = inShards(70_000);
+  const other = inShards(69_000);
+  const mixed = (request, response) => (request.path.endsWith(".0001") ? other : short)(request, response);
+  assert.deepEqual(await fails(mixed), ["truncated", ".0001"]);
+  // A file of the user has no shards beside it.
+  assert.deepEqual(await fails(good, { blob: new Blob([headed.subarray(0, 70_000)]) }), ["truncated", ".0001"]);
 });
 
 test("what was fetched once is kept for the next time", async () => {

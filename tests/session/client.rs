@@ -19,7 +19,7 @@ use tetralod_io::generate;
 
 const BLOCK_BITS: u32 = 6;
 
-fn file(kind: MtKind) -> Vec<u8> {
+pub fn file(kind: MtKind) -> Vec<u8> {
     // More than a client reads at first.
     let mesh = generate::bucky(25).expect("a size that is allowed");
     let construction = Construction::default_for(kind);
@@ -58,7 +58,7 @@ impl RangeSource for Counted {
     }
 }
 
-fn requests() -> Vec<Request> {
+pub fn requests() -> Vec<Request> {
     let mut random = Random(3);
     let mut requests = vec![Request::within(0.05)];
     for _ in 0..6 {
@@ -205,17 +205,21 @@ fn a_request_that_makes_no_sense_changes_nothing() {
     assert_eq!(client.session().hash(), hash);
 }
 
-/// Answers all that `loader` asks for with bytes of `file`, in pieces, until `session` waits for nothing more.
-fn serve(session: &mut Session, loader: &mut Loader, file: &[u8]) -> Result<(), FormatError> {
-    let total = file.len() as u64;
+/// Answers all that `loader` asks for with bytes of `shards`, in pieces, until `session` waits for nothing more.
+fn serve(session: &mut Session, loader: &mut Loader, shards: &[&[u8]]) -> Result<(), FormatError> {
     loop {
         session.supply(loader)?;
-        let (id, range) = match loader.next(0) {
-            Some(Action::Fetch { id, range, .. }) => (id, range),
+        let (id, shard, range) = match loader.next(0) {
+            Some(Action::Fetch { id, shard, range, .. }) => (id, shard, range),
             Some(Action::Cancel { .. }) => continue,
             None => return Ok(()),
             other => panic!("{other:?}"),
         };
+        let Some(file) = shards.get(shard as usize) else {
+            loader.head(id, 0, &ResponseHead { status: 404, ..ResponseHead::default() });
+            continue;
+        };
+        let total = file.len() as u64;
         if range.start >= total {
             loader.head(id, 0, &ResponseHead { status: 416, ..ResponseHead::default() });
             continue;
@@ -236,7 +240,7 @@ fn without_io_it_is_the_same_machine() {
     let file = file(MtKind::HalfEdge);
     let mut loader = Loader::new(LoaderOptions { gap: Some(64), ..LoaderOptions::default() });
     let mut session = Session::in_parts(DecodeOptions::default(), u64::MAX);
-    serve(&mut session, &mut loader, &file).expect("a sound file");
+    serve(&mut session, &mut loader, &[&file]).expect("a sound file");
     assert!(session.mesh().is_some() && !session.is_waiting());
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
@@ -245,7 +249,7 @@ fn without_io_it_is_the_same_machine() {
         let mut stats = session.step(&mut |_| true).expect("a sound file");
         while !stats.done || session.is_waiting() {
             assert!(!stats.done || session.is_waiting(), "there is a reason to go on");
-            serve(&mut session, &mut loader, &file).expect("a sound file");
+            serve(&mut session, &mut loader, &[&file]).expect("a sound file");
             stats = session.step(&mut |_| true).expect("a sound file");
         }
         let expected = whole.refine(&request).expect("a sound file");
@@ -255,16 +259,25 @@ fn without_io_it_is_the_same_machine() {
     assert_eq!(loader.total(), Some(file.len() as u64));
     assert!(session.fetched() <= loader.traffic().received);
     // A file that was cut: told, and not asked for again and again.
-    for end in [10, file.len() / 3] {
+    for end in [10, file.len() / 3, file.len() * 2 / 3] {
         let (mut loader, mut session) =
             (Loader::default(), Session::in_parts(DecodeOptions::default(), u64::MAX));
-        let opened = serve(&mut session, &mut loader, &file[..end]);
+        let opened = serve(&mut session, &mut loader, &[&file[..end]]);
         let found = opened.and_then(|()| {
+            if session.mesh().is_none() {
+                return Ok(());
+            }
             session.request(&Request::within(0.0)).expect("a sensible request");
             session.step(&mut |_| true).expect("a sound beginning");
-            serve(&mut session, &mut loader, &file[..end])
+            serve(&mut session, &mut loader, &[&file[..end]])
         });
-        assert!(matches!(found, Err(FormatError::Truncated { .. })), "{end}: {found:?}");
+        // The rest may be in shards, but is not.
+        match loader.error() {
+            Some(StreamError::MissingShard { suffix, from, total }) => {
+                assert_eq!((&suffix[..], *from, *total), (".0001", end as u64, file.len() as u64));
+            }
+            _ => assert!(matches!(found, Err(FormatError::Truncated { .. })), "{end}: {found:?}"),
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod network;
 mod parts;
 mod quantity;
 mod regions;
+mod shards;
 mod states;
 #[cfg(feature = "http")]
 mod stream_faults;

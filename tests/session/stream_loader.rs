@@ -449,7 +449,10 @@ fn a_cut_connection_is_taken_up_where_it_ended() {
     loader.data(2, 0, &bytes(100..180));
     loader.failed(2, 0, Failure::Network("cut".to_owned()));
     let tagged = Some("\"one\"".to_owned());
-    assert_eq!(actions(&mut loader, 0), [Action::Fetch { id: 3, range: 180..300, if_match: tagged }]);
+    assert_eq!(
+        actions(&mut loader, 0),
+        [Action::Fetch { id: 3, shard: 0, range: 180..300, if_match: tagged }]
+    );
     loader.head(3, 0, &GOOD);
     loader.data(3, 0, &bytes(180..300));
     assert_eq!(loader.take(), Some((100..300, bytes(100..300))));
@@ -548,7 +551,7 @@ fn a_server_without_ranges_is_read_from_the_start_by_one_request() {
     assert_eq!(fetches(&mut loader, 0), []);
     loader.data(1, 0, &bytes(1500..2200));
     assert_eq!(loader.take(), Some((2000..2010, bytes(2000..2010))));
-    let expected = Action::Fetch { id: 2, range: 50..60, if_match: Some("\"one\"".to_owned()) };
+    let expected = Action::Fetch { id: 2, shard: 0, range: 50..60, if_match: Some("\"one\"".to_owned()) };
     assert_eq!(actions(&mut loader, 0), [Action::Cancel { id: 1 }, expected]);
 }
 

@@ -24,6 +24,9 @@ pub(super) struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_deviation: Option<f64>,
     pub file_bytes: u64,
+    /// In how many shards the file is, if these were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shards: Option<u64>,
     pub bytes_per_vertex: f64,
     pub seconds: f64,
     /// What was done in words; the same and more is in `repair`.
@@ -71,7 +74,7 @@ pub(super) fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)
     rows.extend(rows_of(counts));
     rows.extend([
         ("position bits", counts.position_bits.to_string()),
-        ("file size", output::bytes(report.file_bytes)),
+        ("file size", output::file_size(report.file_bytes, report.shards)),
         ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
         (
             "time",

@@ -6,6 +6,7 @@
 
 mod connections;
 
+use crate::files;
 use anyhow::{Context, Result, bail};
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -13,7 +14,7 @@ use axum::extract::Request;
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
-use axum::response::Response;
+use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
 use futures_util::stream::unfold;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
@@ -185,12 +186,29 @@ fn file(path: &Path) -> Result<(Router, String)> {
     let Some(name) = name else { bail!("{}: a name in UTF-8 is needed for the address", path.display()) };
     let at = format!("/{}", utf8_percent_encode(name, RESERVED));
     // Braces mean something in a route: the one file is therefore asked for by its exact address.
-    let (file, only) = (ServeFile::new(path), at.clone());
-    let guard = middleware::from_fn(move |request: Request, next: Next| {
-        let known = request.uri().path() == only;
-        async move { if known { next.run(request).await } else { with_status(StatusCode::NOT_FOUND) } }
-    });
-    Ok((Router::new().fallback_service(file).layer(guard), at))
+    let (file, only) = (path.to_owned(), at.clone());
+    let answer = move |request: Request| {
+        let (file, suffix) = (file.clone(), request.uri().path().strip_prefix(&only).map(str::to_owned));
+        async move {
+            match suffix {
+                Some(suffix) => file_or_shard(&file, &suffix, request).await,
+                None => with_status(StatusCode::NOT_FOUND),
+            }
+        }
+    };
+    Ok((Router::new().fallback(answer), at))
+}
+
+/// Answers with the file at `path`, or with the shard of it that has this suffix.
+pub async fn file_or_shard(path: &Path, suffix: &str, request: Request) -> Response {
+    let is_shard = suffix.strip_prefix('.').is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()));
+    if !suffix.is_empty() && !is_shard {
+        return with_status(StatusCode::NOT_FOUND);
+    }
+    match ServeFile::new(files::with_suffix(path, suffix)).try_call(request).await {
+        Ok(response) => response.into_response(),
+        Err(_) => with_status(StatusCode::NOT_FOUND),
+    }
 }
 
 pub fn with_status(status: StatusCode) -> Response {
@@ -232,10 +250,17 @@ impl Shared {
     fn has(self, path: &str) -> bool {
         match self {
             Self::Nothing => false,
-            Self::MtFiles => path.to_ascii_lowercase().ends_with(".mt"),
+            Self::MtFiles => is_mt_file(path),
             Self::All => true,
         }
     }
+}
+
+/// Whether a path is that of an MT file, or of a shard of one.
+fn is_mt_file(path: &str) -> bool {
+    let name = path.trim_end_matches(|c: char| c.is_ascii_digit());
+    let name = if name.len() + 4 <= path.len() { name.strip_suffix('.').unwrap_or(path) } else { path };
+    name.to_ascii_lowercase().ends_with(".mt")
 }
 
 /// What a server is called by those who mean it. A page elsewhere can give its own name the address of this machine, to read what is served
@@ -388,7 +413,7 @@ fn stop_on_interrupt() -> Result<watch::Receiver<bool>> {
     let (stop, stopped) = watch::channel(false);
     let interrupted = move || {
         if stop.send_replace(true) {
-            std::process::exit(super::files::INTERRUPTED);
+            std::process::exit(files::INTERRUPTED);
         }
     };
     ctrlc::set_handler(interrupted).context("the handler for Ctrl-C could not be set")?;

@@ -21,7 +21,6 @@ use std::io::Write;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
-use tower_http::services::ServeFile;
 
 /// Shows volumes in the browser: MT files, and all that `tetralod build` reads, of which it builds MT files and keeps them in a cache.
 ///
@@ -81,17 +80,15 @@ async fn list(State(volumes): State<Arc<Volumes>>) -> Response {
     Json(volumes.list()).into_response()
 }
 
-/// The MT file of a volume; its name is for people.
+/// The MT file of a volume, or a shard of it; its name is for people, but for what stands behind `.mt`.
 async fn file(
     State(volumes): State<Arc<Volumes>>,
-    InAddress((number, _)): InAddress<(usize, String)>,
+    InAddress((number, name)): InAddress<(usize, String)>,
     request: Request,
 ) -> Response {
     let Some(path) = volumes.file(number) else { return with_status(StatusCode::NOT_FOUND) };
-    match ServeFile::new(path).try_call(request).await {
-        Ok(response) => response.into_response(),
-        Err(_) => with_status(StatusCode::NOT_FOUND),
-    }
+    let suffix = name.rsplit_once(".mt").map_or("", |(_, suffix)| suffix);
+    serve::file_or_shard(&path, suffix, request).await
 }
 
 /// Says where the page is, and opens it.

@@ -8,6 +8,7 @@ use self::lease::{Lease, Leases};
 use self::tasks::{Done, Failed, Files, Tasks};
 use super::output::{self, Verbosity};
 use super::progress::progress_bar;
+use super::shards::Sharding;
 use super::{files, join, machine, parse, part, parts};
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::ProgressBar;
@@ -134,7 +135,9 @@ fn perform(folder: &PathBuf, tasks: &Tasks, task: Node) -> Result<()> {
     let verbosity = Verbosity { quiet: true, ..Verbosity::default() };
     match task.level {
         0 => parts::build_part(slice::from_ref(folder), [task.index, tasks.levels()[0]], &verbosity),
-        _ if task == tasks.last() => join::finish(folder, &tasks.result(task), &verbosity),
+        _ if task == tasks.last() => {
+            join::finish(folder, &tasks.result(task), Sharding::default(), &verbosity)
+        }
         _ => parts::join_node(folder, task, &verbosity),
     }
 }

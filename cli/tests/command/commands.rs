@@ -573,7 +573,7 @@ fn failures_name_the_file_and_leave_nothing() {
     for (file, words) in [
         (&none, "No such file"),
         (&text, "not an MT file"),
-        (&cut, "ends too early"),
+        (&cut, "cut off"),
         (&damaged, "damaged at byte"),
         (&input, "not an MT file"),
     ] {

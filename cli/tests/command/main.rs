@@ -18,6 +18,7 @@ mod remote;
 mod render;
 mod repair;
 mod serve;
+mod shards;
 mod support;
 mod surfaces;
 mod view;

@@ -12,8 +12,10 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen]
 extern "C" {
-    /// `{ id, start, end }`, `{ start, end }`, `{ id }` or `{ until }`: fetch, read from the cache, cancel, wait.
-    #[wasm_bindgen(typescript_type = "{ id?: number, start?: number, end?: number, until?: number }")]
+    /// `{ id, shard, start, end }`, `{ start, end }`, `{ id }` or `{ until }`: fetch, by places in that shard; read from the cache, cancel, wait.
+    #[wasm_bindgen(
+        typescript_type = "{ id?: number, shard?: number, start?: number, end?: number, until?: number }"
+    )]
     pub type JsAction;
     /// `{ start, end, bytes }`.
     #[wasm_bindgen(typescript_type = "{ start: number, end: number, bytes: Uint8Array<ArrayBuffer> }")]
@@ -101,9 +103,9 @@ impl RangeLoader {
             return Err(WebError::of(error));
         }
         Ok(action.map(|action| match action {
-            Action::Fetch { id, range, .. } => {
+            Action::Fetch { id, shard, range, .. } => {
                 let [start, end] = ends(&range);
-                object(&[("id", id.into()), start, end])
+                object(&[("id", id.into()), ("shard", (shard as f64).into()), start, end])
             }
             Action::Read { range } => object(&ends(&range)),
             Action::Cancel { id } => object(&[("id", id.into())]),

@@ -7,9 +7,10 @@ pub use cache::CacheFolder;
 use super::error::StreamError;
 use super::loader::{Action, Failure, Loader, LoaderOptions, Traffic, WantedRange};
 use super::response::ResponseHead;
+use super::shards::shard_suffix;
 use super::source::{Arrived, RangeSource};
 use cache::Cache;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::io::Read;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -48,9 +49,10 @@ pub struct HttpSource {
     loader: Loader,
     options: HttpOptions,
     client: Client,
-    /// Where the file was asked for, and where redirects led to.
+    /// Where the file was asked for.
     given: String,
-    led_to: String,
+    /// Where redirects led to, for each shard that was redirected.
+    led_to: BTreeMap<u64, String>,
     /// Whether other origins that redirects led to are asked directly: not if one has refused without the headers.
     asks_others: bool,
     events: Receiver<Event>,
@@ -74,9 +76,10 @@ enum What {
     Failed(Failure),
 }
 
-/// What a [`ResponseHead`] borrows, where it was asked for, and where redirects led to.
+/// What a [`ResponseHead`] borrows, the shard and the address that were asked for it, and where redirects led to.
 #[derive(Debug)]
 struct OwnedResponseHead {
+    shard: u64,
     asked: String,
     led_to: String,
     status: u16,
@@ -96,10 +99,10 @@ const FIELDS: [header::HeaderName; 7] = [
 
 impl OwnedResponseHead {
     /// Packed answers are unpacked on the way, and their head says neither that nor the length any more.
-    fn of(asked: &str, led_to: String, response: &Response<Body>) -> Self {
+    fn of((shard, asked): (u64, &str), led_to: String, response: &Response<Body>) -> Self {
         let field = |name| Some(response.headers().get(name)?.to_str().ok()?.to_owned());
         let asked = asked.to_owned();
-        Self { asked, led_to, status: response.status().as_u16(), fields: FIELDS.map(field) }
+        Self { shard, asked, led_to, status: response.status().as_u16(), fields: FIELDS.map(field) }
     }
 
     fn head(&self) -> ResponseHead<'_> {
@@ -129,7 +132,7 @@ impl HttpSource {
             client: Client::new(url, &options),
             options,
             given: url.to_owned(),
-            led_to: url.to_owned(),
+            led_to: BTreeMap::new(),
             asks_others: true,
             events,
             sender,
@@ -166,19 +169,20 @@ impl HttpSource {
                     }
                     *open != id
                 }),
-                Action::Fetch { id, range, if_match } => self.fetch(id, range, if_match),
+                Action::Fetch { id, shard, range, if_match } => self.fetch(id, shard, range, if_match),
                 // Only those are told what a cache has who read it later: `want` has read it already.
                 Action::Read { range } => self.loader.lost(&range),
             }
         }
     }
 
-    fn fetch(&mut self, id: u32, range: Range<u64>, if_match: Option<String>) {
+    fn fetch(&mut self, id: u32, shard: u64, range: Range<u64>, if_match: Option<String>) {
         let cancelled = Arc::new(AtomicBool::new(false));
         self.open.push((id, Arc::clone(&cancelled)));
-        let (client, url, sender) = (self.client.clone(), self.led_to.clone(), self.sender.clone());
+        let url = self.led_to.get(&shard).cloned().unwrap_or_else(|| shard_address(&self.given, shard));
+        let (client, sender) = (self.client.clone(), self.sender.clone());
         let run = move || {
-            client.run(&url, range, if_match, &mut |what| {
+            client.run((shard, &url), range, if_match, &mut |what| {
                 !cancelled.load(Ordering::Relaxed) && sender.send(Event(id, what)).is_ok()
             })
         };
@@ -204,10 +208,12 @@ impl HttpSource {
     }
 
     fn take_head(&mut self, id: u32, head: &OwnedResponseHead) {
-        if matches!(head.status, 401 | 403 | 404 | 410) && head.asked != self.given {
+        if matches!(head.status, 401 | 403 | 404 | 410)
+            && head.asked != shard_address(&self.given, head.shard)
+        {
             // Addresses that redirects lead to may be good for a while only.
-            if self.led_to == head.asked {
-                self.led_to.clone_from(&self.given);
+            if self.led_to.get(&head.shard) == Some(&head.asked) {
+                self.led_to.remove(&head.shard);
             }
             self.asks_others &= self.options.headers.is_empty() || is_same_origin(&head.asked, &self.given);
             let expired = Failure::Network(format!("HTTP {} where a redirect led to", head.status));
@@ -216,7 +222,7 @@ impl HttpSource {
         self.loader.head(id, self.now(), &head.head());
         let is_asked = self.asks_others || is_same_origin(&head.led_to, &self.given);
         if matches!(head.status, 200 | 206) && is_asked {
-            self.led_to.clone_from(&head.led_to);
+            self.led_to.insert(head.shard, head.led_to.clone());
         }
     }
 
@@ -365,7 +371,7 @@ impl Client {
     /// One request from beginning to end; `report` returns whether the answer is still wanted.
     fn run(
         &self,
-        url: &str,
+        (shard, url): (u64, &str),
         range: Range<u64>,
         if_match: Option<String>,
         report: &mut dyn FnMut(What) -> bool,
@@ -380,7 +386,7 @@ impl Client {
                 return;
             }
         };
-        if !report(What::Head(Box::new(OwnedResponseHead::of(url, led_to, &response)))) {
+        if !report(What::Head(Box::new(OwnedResponseHead::of((shard, url), led_to, &response)))) {
             return;
         }
         let mut body = response.into_body().into_reader();
@@ -398,6 +404,12 @@ impl Client {
             }
         }
     }
+}
+
+/// The address of a shard of the file at `given`: the suffix belongs to the path.
+fn shard_address(given: &str, shard: u64) -> String {
+    let (path, rest) = given.split_at(given.find(['?', '#']).unwrap_or(given.len()));
+    format!("{path}{}{rest}", shard_suffix(shard))
 }
 
 /// Whether two addresses have the scheme, the host and the port in common. Those that are none have not.
