@@ -70,30 +70,34 @@ mod pieces;
 mod polyhedra;
 mod pvd;
 mod pvtu;
+mod ranges;
 mod raw;
 mod reading;
 mod scanner;
 mod shares;
+mod skeleton;
 mod steps_in_memory;
+mod stored;
 mod structured;
 mod surface;
 mod survey;
 mod tensors;
 mod time_steps;
 mod vtu;
+mod vtu_ranges;
 mod write;
 mod write_layers;
 mod xml;
 mod xz;
 
 #[doc(hidden)]
-pub use contents::Survey;
+pub use contents::{PieceCounts, Survey};
 pub use error::{ReadError, ReadReason};
 pub use in_memory::FilesInMemory;
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
 #[doc(hidden)]
-pub use pieces::{PieceCounts, Pieces};
+pub use pieces::Pieces;
 #[doc(hidden)]
 pub use pvd::write_pvd;
 pub use pvd::{Step, steps};
