@@ -202,7 +202,8 @@ fn ranges_of_cells_are_built_as_their_whole() {
     fs::copy(format!("{dir}/built.mt"), &mt).expect("a file");
     assert!(same(), "by a worker");
     // What is no range says why.
-    let lines = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"5\" NumberOfCells=\"2\"><Points>\
+    let lines = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"5\" NumberOfCells=\"2\"><PointData>\
+                 <DataArray type=\"Float64\" Name=\"p\">0 1 2 3 4</DataArray></PointData><Points>\
                  <DataArray type=\"Float64\" NumberOfComponents=\"3\">0 0 0 1 0 0 0 1 0 0 0 1 1 1 1</DataArray></Points><Cells>\
                  <DataArray type=\"Int64\" Name=\"connectivity\">0 1 2 3 1 2 3 4</DataArray>\
                  <DataArray type=\"Int64\" Name=\"offsets\">4 8</DataArray><DataArray type=\"UInt8\" Name=\"types\">10 10</DataArray>\
