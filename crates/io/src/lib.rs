@@ -32,7 +32,7 @@
 //! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`] and [`FilesInMemory::steps`].
 //! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones and polyhedra; cells without a
 //! volume are left out beside them. How cells are split is in `cell_shapes` and `polyhedra`. Readers check the file, not the mesh: see
-//! [`tetralod::mesh::repair`]. Meshes in several files can be read one piece at a time: `Pieces`.
+//! [`tetralod::mesh::repair`]. Meshes in several files, and ranges of cells of large ones, can be read one piece at a time: `Pieces`.
 
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
