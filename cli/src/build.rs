@@ -139,7 +139,7 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
     if is_whole || config.min_dihedral.is_some() {
         return Ok(None);
     }
-    options.in_pieces(config, arguments.memory, |input| {
+    options.in_pieces(config, arguments.memory, verbosity, |input| {
         let way = match arguments.parts {
             Some(count) => Way::Parts(count),
             None => {

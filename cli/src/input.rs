@@ -88,13 +88,13 @@ pub fn read_cells(
     })?;
     drop(input);
     files::note_inputs(&mesh.input.files.0);
-    say_notes(&mesh, &steps[0].path);
+    say_notes(&mesh.notes, &steps[0].path);
     mend(mesh, level, &steps[0].path)
 }
 
 /// Says what the reader left out of a file.
-fn say_notes(mesh: &TetMesh, path: &Path) {
-    mesh.notes.iter().for_each(|note| output::note(&format!("note: {}: {note}", name(path))));
+pub fn say_notes(notes: &[String], path: &Path) {
+    notes.iter().for_each(|note| output::note(&format!("note: {}: {note}", name(path))));
 }
 
 /// The time steps in these files.

@@ -118,7 +118,7 @@ fn part(arguments: &Arguments, forget: &dyn Fn() -> Result<()>) -> Result<()> {
             Ok(plan)
         })
     };
-    let by_pieces = options.in_pieces(&config, None, |input| {
+    let by_pieces = options.in_pieces(&config, None, verbosity, |input| {
         let part = |folder: &Path| {
             Folder(folder).part_pieces(&input, &config, *parts, metadata.clone())?.map_err(Into::into)
         };

@@ -109,6 +109,9 @@ pub struct BuildOptions {
     /// half-edge].
     #[arg(long, value_name = "N", value_parser = block_bits)]
     block_updates: Option<u32>,
+    /// Tetrahedra of a range of cells, where the input is read by such: for tests.
+    #[arg(long, value_name = "N", hide = true)]
+    pub(super) range: Option<u64>,
 }
 
 /// Parses the name of a kind of MT.

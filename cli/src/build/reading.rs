@@ -7,10 +7,14 @@ use crate::parts::InPieces;
 use crate::repair::Repair;
 use crate::{files, input};
 use anyhow::{Result, anyhow};
-use tetralod::mesh::{GeometryField, RepairLevel, RepairReport, TetMesh};
+use std::cell::RefCell;
+use tetralod::mesh::{GeometryField, MeshInput, RepairLevel, RepairReport, TetMesh};
 use tetralod_build::parts::PartsError;
 use tetralod_build::{BuildConfig, mark_labels};
 use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
+
+/// Endings of files that are read by ranges of cells.
+const BY_RANGES: [&str; 3] = ["vtu", "vtkhdf", "hdf"];
 
 impl BuildOptions {
     /// Tells what was repaired, and what was found.
@@ -71,11 +75,13 @@ impl BuildOptions {
             .map_err(|(name, unit)| anyhow!("--unit {name}={unit}: there is no field '{name}'"))
     }
 
-    /// The pieces of the input, if it is a list of such that can be read one by one; `prepare` does what the options say to each.
+    /// The pieces of the input, if it is a list of such that can be read one by one, or a file that is read by ranges of cells; `prepare` does
+    /// what the options say to each.
     pub fn in_pieces<T>(
         &self,
         config: &BuildConfig,
         memory: Option<u64>,
+        verbosity: &Verbosity,
         work: impl FnOnce(InPieces<'_>) -> Result<Option<T>>,
     ) -> Result<Option<T>> {
         let needs_points = |name: &String| GeometryField::named(name).is_some();
@@ -84,7 +90,8 @@ impl BuildOptions {
             || matches!(self.repair.level(), RepairLevel::Weld { .. })
             || config.fields.iter().any(needs_points);
         let [path] = &self.inputs[..] else { return Ok(None) };
-        if needs_whole || files::ending(path) != "pvtu" {
+        let is_list = files::ending(path) == "pvtu";
+        if needs_whole || !is_list && !BY_RANGES.contains(&files::ending(path).as_str()) {
             return Ok(None);
         }
         let steps = tetralod_io::steps(path)?;
@@ -100,16 +107,35 @@ impl BuildOptions {
         };
         let memory = input::Source { memory, ..input::Source::default() }.limit();
         let options = ReadOptions { step: step.number, memory, ..wanted.options() };
-        let Some(pieces) = Pieces::open(&step.path, &options)? else { return Ok(None) };
+        let pieces = if is_list {
+            Pieces::open(&step.path, &options)?.ok_or(None)
+        } else {
+            Pieces::open_ranges(&step.path, &options, self.range)?
+        };
+        let pieces = match pieces {
+            Ok(pieces) => pieces,
+            Err(why) => {
+                why.into_iter().for_each(|why| self.tell(&PartsError::NeedsWhole { why }, verbosity));
+                return Ok(None);
+            }
+        };
+        let known = RefCell::new(MeshInput::default());
         let prepare = |mesh: &mut TetMesh| {
             files::note_inputs(&mesh.input.files.0);
+            let notes = std::mem::take(&mut mesh.input.notes);
+            known.borrow_mut().append(MeshInput { notes, ..MeshInput::default() });
             if step.time.is_some() {
                 mesh.fields.iter_mut().for_each(|field| field.time = step.time);
             }
             mark_labels(mesh, &[], config)?;
             self.set_units(mesh)
         };
-        work(InPieces { pieces, prepare: &prepare })
+        let done = work(InPieces { pieces, prepare: &prepare })?;
+        // The whole tells it again.
+        if done.is_some() {
+            input::say_notes(&known.borrow().lines(), path);
+        }
+        Ok(done)
     }
 
     /// Tells why pieces are read as a whole after all.

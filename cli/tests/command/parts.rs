@@ -186,6 +186,36 @@ fn pieces_are_built_as_their_whole() {
 }
 
 #[test]
+fn ranges_of_cells_are_built_as_their_whole() {
+    let folder = Folder::new("parts-ranges");
+    let [flow, ascii, dir, mt, other] =
+        ["flow.vtu", "ascii.vtu", "dir", "a.mt", "b.mt"].map(|name| folder.path(name));
+    good(&["generate", "sphere-flow", "--size", "6", "-o", &flow]);
+    good(&["build", &flow, "--parts", "4", "-o", &other]);
+    let names = folder.names().len();
+    let by_ranges = ["--parts", "4", "--range", "300", "-o"];
+    good(&[&["build", &flow][..], &by_ranges, &[&mt]].concat());
+    let same = || fs::read(&mt).expect("a file") == fs::read(&other).expect("a file");
+    assert!(same(), "by one process");
+    good(&[&["part", &flow][..], &by_ranges, &[&dir]].concat());
+    good(&["work", &dir, "--quiet"]);
+    fs::copy(format!("{dir}/built.mt"), &mt).expect("a file");
+    assert!(same(), "by a worker");
+    // What is no range says why.
+    let lines = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"5\" NumberOfCells=\"2\"><PointData>\
+                 <DataArray type=\"Float64\" Name=\"p\">0 1 2 3 4</DataArray></PointData><Points>\
+                 <DataArray type=\"Float64\" NumberOfComponents=\"3\">0 0 0 1 0 0 0 1 0 0 0 1 1 1 1</DataArray></Points><Cells>\
+                 <DataArray type=\"Int64\" Name=\"connectivity\">0 1 2 3 1 2 3 4</DataArray>\
+                 <DataArray type=\"Int64\" Name=\"offsets\">4 8</DataArray><DataArray type=\"UInt8\" Name=\"types\">10 10</DataArray>\
+                 </Cells></Piece></UnstructuredGrid></VTKFile>";
+    fs::write(&ascii, lines).expect("a file");
+    let output = run(&["part", &ascii, "--parts", "1", "--range", "1", "-o", &folder.path("dir2")]);
+    let told = text(&output.stderr);
+    assert!(output.status.success() && told.contains("its numbers are text"), "{told}");
+    assert_eq!(folder.names().len(), names + 4, "nothing is left behind: {:?}", folder.names());
+}
+
+#[test]
 fn the_head_of_a_file_tells_what_needs_no_updates() {
     let folder = Folder::new("info-head");
     let mt = folder.path("a.mt");

@@ -67,7 +67,11 @@ fn points_of_flat(kind: i64) -> Option<i64> {
 /// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a
 /// volume, with the number of each type. Polyhedra are not counted: their types do not say how many those become.
 pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
-    let counts = counts_of(types);
+    most_tets_of(counts_of(types))
+}
+
+/// The same of so many cells of each type.
+pub(super) fn most_tets_of(counts: BTreeMap<i64, u64>) -> Result<u64, ReadReason> {
     let mut tets = 0_u64;
     for (&kind, &count) in &counts {
         match recipe(kind) {
@@ -78,13 +82,14 @@ pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
             None => return Err(ReadReason::CellTypes(counts.into_iter().collect())),
         }
     }
-    if tets == 0 && !types.is_empty() && !counts.contains_key(&POLYHEDRON) {
+    if tets == 0 && !counts.is_empty() && !counts.contains_key(&POLYHEDRON) {
         return Err(ReadReason::CellTypes(counts.into_iter().collect()));
     }
     Ok(tets)
 }
 
-fn counts_of(types: &[i64]) -> BTreeMap<i64, u64> {
+/// How many cells there are of each type.
+pub(super) fn counts_of(types: &[i64]) -> BTreeMap<i64, u64> {
     let mut counts = BTreeMap::new();
     // Most files have long runs of one type.
     for run in types.chunk_by(|a, b| a == b) {
@@ -132,8 +137,18 @@ impl Recipes {
 
 /// Checks where cells of these types end in the connectivity list; returns its length.
 pub(super) fn checked_ends(types: &[i64], ends: &[i64]) -> Result<usize, ReadReason> {
-    let (mut start, mut recipes) = (0, Recipes::default());
-    for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
+    let length = checked_range(types, ends, (0, 0))?;
+    usize::try_from(length).map_err(|_| ReadReason::TooLarge { what: "cells".into(), limit: u64::MAX })
+}
+
+/// The same of cells of which the first one has a number, and begins there in the list; returns where the last one ends.
+pub(super) fn checked_range(
+    types: &[i64],
+    ends: &[i64],
+    (first, mut start): (u64, i64),
+) -> Result<i64, ReadReason> {
+    let mut recipes = Recipes::default();
+    for (cell, (&kind, &end)) in (first..).zip(types.iter().zip(ends)) {
         let needed =
             recipes.of(kind).map(|(recipe, _)| recipe.points as i64).or_else(|| points_of_flat(kind));
         let found = end.checked_sub(start).filter(|n| *n >= 0);
@@ -147,7 +162,7 @@ pub(super) fn checked_ends(types: &[i64], ends: &[i64]) -> Result<usize, ReadRea
         }
         start = end;
     }
-    usize::try_from(start).map_err(|_| ReadReason::TooLarge { what: "cells".into(), limit: u64::MAX })
+    Ok(start)
 }
 
 /// The tetrahedra of some cells.

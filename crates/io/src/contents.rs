@@ -44,3 +44,18 @@ impl Survey {
         Self { format, points: product(0), cells: 6 * product(1), grid: Some(grid), fields, cell_fields }
     }
 }
+
+/// How much there is in pieces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PieceCounts {
+    /// Points of all pieces; those that several have count in each.
+    pub points: u64,
+    /// Tetrahedra of all pieces, at most.
+    pub tetrahedra: u64,
+    /// How many pieces there are.
+    pub pieces: u64,
+    /// Tetrahedra of the largest piece, at most.
+    pub largest: u64,
+    /// Fields at points.
+    pub fields: u64,
+}

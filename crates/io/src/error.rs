@@ -198,6 +198,39 @@ impl<T> At<T> for Result<T, ReadReason> {
     }
 }
 
+/// Why a file is not read by parts of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// It has to be read as a whole, for this reason.
+    Whole(&'static str),
+    /// It cannot be read.
+    Read(ReadError),
+}
+
+impl From<ReadReason> for Stop {
+    fn from(reason: ReadReason) -> Self {
+        Self::Read(ReadError { file: String::new(), place: String::new(), reason })
+    }
+}
+
+impl From<ReadError> for Stop {
+    fn from(error: ReadError) -> Self {
+        Self::Read(error)
+    }
+}
+
+impl Stop {
+    /// The same at `place`, if nothing else was said of where it is.
+    pub fn at(self, place: impl FnOnce() -> String) -> Self {
+        match self {
+            Self::Read(ReadError { file, place: none, reason }) if none.is_empty() => {
+                Self::Read(ReadError { file, place: place(), reason })
+            }
+            other => other,
+        }
+    }
+}
+
 /// "1 hexahedron", "3 wedges", "2 cells of type 99", "5 Lagrange tetrahedra of 20 points".
 fn named_count(kind: i64, count: u64) -> String {
     let (of, points) = match kind.checked_div(ANY_ORDER) {

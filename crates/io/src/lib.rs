@@ -32,7 +32,7 @@
 //! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`] and [`FilesInMemory::steps`].
 //! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones and polyhedra; cells without a
 //! volume are left out beside them. How cells are split is in `cell_shapes` and `polyhedra`. Readers check the file, not the mesh: see
-//! [`tetralod::mesh::repair`]. Meshes in several files can be read one piece at a time: `Pieces`.
+//! [`tetralod::mesh::repair`]. Meshes in several files, and ranges of cells of large ones, can be read one piece at a time: `Pieces`.
 
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
@@ -70,30 +70,34 @@ mod pieces;
 mod polyhedra;
 mod pvd;
 mod pvtu;
+mod ranges;
 mod raw;
 mod reading;
 mod scanner;
 mod shares;
+mod skeleton;
 mod steps_in_memory;
+mod stored;
 mod structured;
 mod surface;
 mod survey;
 mod tensors;
 mod time_steps;
 mod vtu;
+mod vtu_ranges;
 mod write;
 mod write_layers;
 mod xml;
 mod xz;
 
 #[doc(hidden)]
-pub use contents::Survey;
+pub use contents::{PieceCounts, Survey};
 pub use error::{ReadError, ReadReason};
 pub use in_memory::FilesInMemory;
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
 #[doc(hidden)]
-pub use pieces::{PieceCounts, Pieces};
+pub use pieces::Pieces;
 #[doc(hidden)]
 pub use pvd::write_pvd;
 pub use pvd::{Step, steps};

@@ -32,6 +32,19 @@ pub(super) struct Framing {
     pub compressor: Option<Compressor>,
 }
 
+impl Framing {
+    /// Bytes of a header number.
+    pub fn width(self) -> usize {
+        if self.wide { 8 } else { 4 }
+    }
+
+    /// A header number of these bytes.
+    pub fn number(self, bytes: &[u8]) -> u64 {
+        let fold = |n: u64, b: &u8| n << 8 | u64::from(*b);
+        if self.big { bytes.iter().fold(0, fold) } else { bytes.iter().rev().fold(0, fold) }
+    }
+}
+
 /// Where the bytes of a block come from.
 pub(super) enum Source<'a> {
     /// The bytes themselves.
@@ -84,7 +97,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 const GROUPS: usize = 1 << 15;
 
 /// Appends to `bytes` what groups of four characters stand for.
-fn decode_groups(groups: &[u8], bytes: &mut Vec<u8>) -> Result<(), ReadReason> {
+pub(super) fn decode_groups(groups: &[u8], bytes: &mut Vec<u8>) -> Result<(), ReadReason> {
     let damaged = |error| ReadReason::Damaged(format!("base64: {error}"));
     if groups.len() <= 4 * GROUPS {
         return BASE64.decode_vec(groups, bytes).map_err(damaged);
@@ -180,13 +193,7 @@ pub(super) fn read_block<'a>(
         let mut part = Vec::new();
         for i in share {
             let expected = to_usize(if i as u64 + partial < blocks { block_size } else { last_size })?;
-            let before = part.len();
-            decompress(compressor, &packed[i], expected, &mut part)?;
-            let found = part.len() - before;
-            if found != expected {
-                let what = format!("block {i} unpacks to {found} bytes instead of {expected}");
-                return Err(ReadReason::Damaged(what));
-            }
+            unpack(compressor, i, &packed[i], expected, &mut part)?;
         }
         Ok(part)
     })?;
@@ -194,16 +201,32 @@ pub(super) fn read_block<'a>(
 }
 
 /// Compressed blocks that a thread unpacks at a time. VTK's have 32 KiB each.
-const BLOCKS: usize = 4;
+pub(super) const BLOCKS: usize = 4;
 
-fn to_usize(n: u64) -> Result<usize, ReadReason> {
+pub(super) fn to_usize(n: u64) -> Result<usize, ReadReason> {
     usize::try_from(n).map_err(|_| ReadReason::Truncated { needed: n, found: 0 })
 }
 
 fn header_number(source: &mut Source<'_>, framing: Framing) -> Result<u64, ReadReason> {
-    let bytes = source.take(if framing.wide { 8 } else { 4 })?;
-    let fold = |n: u64, b: &u8| n << 8 | u64::from(*b);
-    Ok(if framing.big { bytes.iter().fold(0, fold) } else { bytes.iter().rev().fold(0, fold) })
+    Ok(framing.number(&source.take(framing.width())?))
+}
+
+/// Appends the `expected` bytes of compressed block number `i` to `data`.
+pub(super) fn unpack(
+    compressor: Compressor,
+    i: usize,
+    compressed: &[u8],
+    expected: usize,
+    data: &mut Vec<u8>,
+) -> Result<(), ReadReason> {
+    let before = data.len();
+    decompress(compressor, compressed, expected, data)?;
+    let found = data.len() - before;
+    if found != expected {
+        let what = format!("block {i} unpacks to {found} bytes instead of {expected}");
+        return Err(ReadReason::Damaged(what));
+    }
+    Ok(())
 }
 
 /// Appends the `expected` bytes of a compressed block to `data`; at most one more when the block is damaged.

@@ -1,44 +1,42 @@
-//! Meshes in several files, piece by piece: the same mesh as that of the [whole](super::pvtu), of which no more than a piece is in memory,
-//! and the points at which pieces meet.
+//! Meshes piece by piece: the same mesh as that of the whole, of which no more than a piece is in memory, and the points at which pieces meet.
 //!
-//! Files are read twice: at first for their points alone, to know which places several pieces have.
+//! Those in [several files](super::pvtu) are read twice: at first for their points alone, to know which places several pieces have. Those in one
+//! file come by [ranges](super::ranges).
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::beside::{FilesOf, place};
-use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::error::{At, ReadError, ReadReason, Stop, in_file};
 use crate::fields::settle_unused;
 use crate::file_kind::without_mark;
+#[cfg(feature = "hdf5")]
+use crate::formats::vtkhdf_ranges::HdfFile;
 use crate::listed::{for_each_file, names};
 use crate::numbering::Numbering;
 use crate::pvtu::{bits, numbered};
-use crate::vtu::{PieceReader, in_order};
+use crate::vtu::{NumberPoints, PieceReader, in_order};
+use crate::vtu_ranges::VtuFile;
 use crate::xml::Document;
-use crate::{ReadOptions, packed};
+use crate::{CellData, PieceCounts, ReadOptions, packed};
 use tetralod::mesh::{Field, MeshPiece, Middles, TetMesh};
 
-/// A mesh in several files, of which one is read at a time.
-#[derive(Clone, Debug)]
+/// A mesh of which a piece is read at a time.
+#[derive(Debug)]
 pub struct Pieces {
     path: PathBuf,
-    list: Vec<u8>,
+    content: Content,
     options: ReadOptions,
 }
 
-/// How much there is in pieces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PieceCounts {
-    /// Points of all pieces; those that several have count in each.
-    pub points: u64,
-    /// Tetrahedra of all pieces, at most.
-    pub tetrahedra: u64,
-    /// How many pieces there are.
-    pub pieces: u64,
-    /// Tetrahedra of the largest piece, at most.
-    pub largest: u64,
-    /// Fields at points.
-    pub fields: u64,
+/// Where pieces are.
+#[derive(Debug)]
+enum Content {
+    /// In the files that this list names.
+    List(Vec<u8>),
+    Vtu(VtuFile),
+    #[cfg(feature = "hdf5")]
+    Hdf(HdfFile),
 }
 
 impl Pieces {
@@ -52,15 +50,39 @@ impl Pieces {
         if super::format_of(&bytes) != Some("pvtu") {
             return Ok(None);
         }
-        Ok(Some(Self { path: path.to_owned(), list: bytes, options: options.clone() }))
+        let content = Content::List(bytes);
+        Ok(Some(Self { path: path.to_owned(), content, options: options.clone() }))
+    }
+
+    /// Opens a file with an unstructured grid (`.vtu`, `.vtkhdf`) that is read by its partitions, or by ranges of cells, each of which becomes `most` tetrahedra or a
+    /// few more, or as many as take the least memory if nothing is said. The reason if the file has to be read as a whole; nothing is to be said
+    /// of one that is another one, or of one range.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is damaged, as far as that follows from its structure.
+    pub fn open_ranges(
+        path: &Path,
+        options: &ReadOptions,
+        most: Option<u64>,
+    ) -> Result<Result<Self, Option<&'static str>>, ReadError> {
+        if options.cells == CellData::Values {
+            return Ok(Err(Some("values at cells are read")));
+        }
+        match Content::of(path, options, most) {
+            Ok(Some(content)) => Ok(Ok(Self { path: path.to_owned(), content, options: options.clone() })),
+            Ok(None) => Ok(Err(None)),
+            Err(Stop::Whole(why)) => Ok(Err(Some(why))),
+            Err(Stop::Read(error)) => Err(in_file(error, &path.display().to_string())),
+        }
     }
 
     /// The files with the pieces, which may not be there.
     ///
     /// # Errors
-    /// If the list is damaged, or names a file elsewhere than beside it or below.
+    /// If the list of them is damaged, or names a file elsewhere than beside it or below.
     pub fn files(&self) -> Result<Vec<PathBuf>, ReadError> {
-        let document = Document::parse(without_mark(&self.list)).map_err(|error| self.named(error))?;
+        let Content::List(list) = &self.content else { return Ok(vec![self.path.clone()]) };
+        let document = Document::parse(without_mark(list)).map_err(|error| self.named(error))?;
         let files = names(&document).iter().map(|name| place(&self.path, name)).collect::<Result<_, _>>();
         files.at(String::new).map_err(|error| self.named(error))
     }
@@ -70,7 +92,13 @@ impl Pieces {
     /// # Errors
     /// As [`read_with`](super::read_with), as far as that follows from the structure of the files.
     pub fn counts(&self) -> Result<PieceCounts, ReadError> {
-        let document = Document::parse(without_mark(&self.list)).map_err(|error| self.named(error))?;
+        let list = match &self.content {
+            Content::List(list) => list,
+            Content::Vtu(file) => return Ok(file.counts()),
+            #[cfg(feature = "hdf5")]
+            Content::Hdf(file) => return Ok(file.counts()),
+        };
+        let document = Document::parse(without_mark(list)).map_err(|error| self.named(error))?;
         let mut counts = PieceCounts::default();
         let files = FilesOf::on_disk(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
@@ -98,9 +126,8 @@ impl Pieces {
         &self,
         each: &mut dyn FnMut(MeshPiece) -> Result<(), E>,
     ) -> Result<(), E> {
-        let document = Document::parse(without_mark(&self.list)).map_err(|error| self.named(error))?;
         let mut failed = None;
-        let read = self.read_all(&document, &mut |piece| {
+        let read = self.read_all(&mut |piece| {
             each(piece).map_err(|error| {
                 failed = Some(error);
                 // Never seen: the error of the caller is.
@@ -117,7 +144,51 @@ impl Pieces {
         in_file(error, &self.path.display().to_string())
     }
 
-    fn read_all(
+    fn read_all(&self, each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>) -> Result<(), ReadError> {
+        let each = &mut |mut piece: MeshPiece| {
+            if piece.mesh.input.files.0.is_empty() {
+                piece.mesh.input.files.0.push(self.path.clone());
+            }
+            each(piece)
+        };
+        let read = match &self.content {
+            Content::List(list) => return self.read_listed(&Document::parse(without_mark(list))?, each),
+            Content::Vtu(file) => file.for_each(&self.options, each),
+            #[cfg(feature = "hdf5")]
+            Content::Hdf(file) if file.partitions() > 1 => return self.read_partitions(file, each),
+            #[cfg(feature = "hdf5")]
+            Content::Hdf(file) => file.for_each(&self.options, each),
+        };
+        read.map_err(|stop| match stop {
+            Stop::Read(error) => error,
+            // It was not so when it was opened.
+            Stop::Whole(why) => {
+                let reason = ReadReason::Io(format!("it has changed: {why}"));
+                ReadError { file: String::new(), place: String::new(), reason }
+            }
+        })
+    }
+
+    #[cfg(feature = "hdf5")]
+    fn read_partitions(
+        &self,
+        file: &HdfFile,
+        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
+    ) -> Result<(), ReadError> {
+        let afresh = || ReadOptions { memory: self.options.memory.afresh(), ..self.options.clone() };
+        let mut hashes = Vec::new();
+        for number in 0..file.partitions() {
+            hashes.extend(file.points(number, &afresh())?.into_iter().map(hash));
+        }
+        let mut seen = Seen { several: repeated(hashes), ..Seen::default() };
+        for number in 0..file.partitions() {
+            let place = || format!("piece {number}, PointData");
+            each(seen.read(&mut |numbers| file.read(number, &afresh(), numbers), &place)?)?;
+        }
+        Ok(())
+    }
+
+    fn read_listed(
         &self,
         document: &Document<'_>,
         each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
@@ -136,7 +207,8 @@ impl Pieces {
         let mut seen = Seen { several: repeated(hashes), ..Seen::default() };
         for_each_file(document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
-                let mut piece = seen.read(reader)?;
+                let place = || format!("piece {}, <PointData>", reader.number);
+                let mut piece = seen.read(&mut |numbers| reader.read(numbers), &place)?;
                 let MeshPiece { mesh: TetMesh { fields, cell_fields, input, .. }, .. } = &mut piece;
                 input.files.0.extend(files.last());
                 fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
@@ -156,6 +228,18 @@ impl Pieces {
             let options = &ReadOptions { memory: self.options.memory.afresh(), ..self.options.clone() };
             read(&PieceReader { document, piece, number, options })
         })
+    }
+}
+
+impl Content {
+    /// A file that has several ranges; none if it is another one, or has not.
+    fn of(path: &Path, options: &ReadOptions, most: Option<u64>) -> Result<Option<Self>, Stop> {
+        #[cfg(feature = "hdf5")]
+        if let Some(file) = HdfFile::open(path, options, most)? {
+            return Ok(Some(Self::Hdf(file)));
+        }
+        let file = VtuFile::open(path, options, most)?;
+        Ok(file.filter(|file| file.ranges().count() > 1).map(Self::Vtu))
     }
 }
 
@@ -189,9 +273,14 @@ struct Seen {
 }
 
 impl Seen {
-    fn read(&mut self, reader: &PieceReader<'_, '_>) -> Result<MeshPiece, ReadError> {
+    /// The piece that `read` reads, given how to number its points; `place` is where its fields are.
+    fn read(
+        &mut self,
+        read: &mut dyn FnMut(NumberPoints<'_>) -> Result<TetMesh, ReadError>,
+        place: &dyn Fn() -> String,
+    ) -> Result<MeshPiece, ReadError> {
         let (mut numbers, mut new) = (Vec::new(), Vec::new());
-        let mut mesh = reader.read(&mut |points| {
+        let mut mesh = read(&mut |points| {
             // Of most points it is known without a look into the table that it does not have them.
             let is_known = |point| self.several.binary_search(&hash(point)).is_ok();
             let known = |point| self.known.get(&bits(point)).filter(|_| is_known(point));
@@ -203,7 +292,6 @@ impl Seen {
             numbers.push((self.points + new.len()) as u32);
             new.push(index);
         }
-        let place = || format!("piece {}, <PointData>", reader.number);
         match &self.fields {
             None => {
                 let names =

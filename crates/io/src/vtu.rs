@@ -119,19 +119,32 @@ impl PieceReader<'_, '_> {
 
     fn collect(
         &self,
-        mut collector: Collector<'_>,
+        collector: Collector<'_>,
         section: &str,
         tuples: usize,
     ) -> Result<[Vec<Field>; 2], ReadError> {
+        self.collect_by(collector, section, &mut |array, components| {
+            self.expect_numbers(tuples.saturating_mul(components)).at(|| array.place())?;
+            self.document.floats(array, tuples, components).at(|| array.place())
+        })
+    }
+
+    /// The fields in a section, whose values `values` reads, given how many components there are.
+    pub fn collect_by<E: From<ReadError>>(
+        &self,
+        mut collector: Collector<'_>,
+        section: &str,
+        values: &mut dyn FnMut(&Array<'_>, usize) -> Result<Vec<f64>, E>,
+    ) -> Result<[Vec<Field>; 2], E> {
         for array in self.piece.section(section).filter(|array| is_field(array)) {
             let Some(number) = array.number_type() else { continue };
             let components = array.components().at(|| array.place())?;
             let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? else {
                 continue;
             };
-            self.expect_numbers(tuples.saturating_mul(components)).at(|| array.place())?;
-            let values = self.document.floats(array, tuples, components).at(|| array.place())?;
-            collector.fill(claim, values, number.is_integer(), array.unit()).at(|| array.place())?;
+            collector
+                .fill(claim, values(array, components)?, number.is_integer(), array.unit())
+                .at(|| array.place())?;
         }
         Ok([collector.fields, collector.others])
     }
@@ -157,15 +170,20 @@ impl PieceReader<'_, '_> {
         Ok(collector.fields)
     }
 
-    pub fn points(&self, points: usize) -> Result<Vec<[f64; 3]>, ReadError> {
-        let Some(array) = self.piece.section("Points").next() else {
-            if points == 0 {
-                return Ok(Vec::new());
-            }
-            return Err(ReadReason::Missing("the array of <Points>".into())).at(|| self.place());
-        };
+    /// The array of the points, which there must be where there are some.
+    pub fn points_array(&self) -> Result<&Array<'_>, ReadError> {
+        let missing = || ReadReason::Missing("the array of <Points>".into());
+        let array = self.piece.section("Points").next().ok_or_else(missing).at(|| self.place())?;
         let components = array.components().at(|| array.place())?;
         expect_count("components of the points", 3_u64, components).at(|| array.place())?;
+        Ok(array)
+    }
+
+    pub fn points(&self, points: usize) -> Result<Vec<[f64; 3]>, ReadError> {
+        if points == 0 && self.piece.section("Points").next().is_none() {
+            return Ok(Vec::new());
+        }
+        let array = self.points_array()?;
         self.options.memory.take((points as u64).saturating_mul(24)).at(|| array.place())?;
         self.expect_numbers(points.saturating_mul(3)).at(|| array.place())?;
         let values = self.document.floats(array, points, 3).at(|| array.place())?;
@@ -211,7 +229,7 @@ impl PieceReader<'_, '_> {
     }
 
     /// An array of <Cells>.
-    fn of_cells(&self, name: &str) -> Result<&Array<'_>, ReadError> {
+    pub fn of_cells(&self, name: &str) -> Result<&Array<'_>, ReadError> {
         let found = self.piece.section("Cells").find(|a| a.name() == name);
         let missing = || ReadReason::Missing(format!("array \"{name}\" of <Cells>"));
         found.ok_or_else(missing).at(|| self.place())

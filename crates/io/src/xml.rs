@@ -161,7 +161,7 @@ pub(super) struct Document<'a> {
     pub pieces: Vec<Piece<'a>>,
     /// The arrays of the whole data set.
     field_data: Vec<Array<'a>>,
-    framing: Framing,
+    pub framing: Framing,
     appended: Option<Appended<'a>>,
 }
 
@@ -217,9 +217,14 @@ impl<'a> Document<'a> {
         self.version < version
     }
 
-    /// The time of the data set, as VTK writes it; none if that is not a finite number.
+    /// The array with the time of the data set, as VTK writes it.
+    pub fn time_array(&self) -> Option<&Array<'a>> {
+        self.field_data.iter().find(|array| array.name() == "TimeValue")
+    }
+
+    /// The time of the data set; none if that is not a finite number.
     pub fn time(&self) -> Option<f64> {
-        let array = self.field_data.iter().find(|array| array.name() == "TimeValue")?;
+        let array = self.time_array()?;
         let time = self.floats(array, 1, 1).ok()?.first().copied();
         time.filter(|time| time.is_finite())
     }
@@ -285,6 +290,19 @@ impl<'a> Document<'a> {
         decode(number, &block, self.framing.big)
     }
 
+    /// Where the values of an array are, for those who read some of them.
+    pub fn place_of<'b>(&'b self, array: &'b Array<'a>) -> Result<Place<'b>, ReadReason> {
+        Ok(match array.encoding() {
+            Encoding::Ascii => Place::Numbers,
+            Encoding::Binary => Place::Inline(&array.text),
+            Encoding::Appended => {
+                let appended =
+                    self.appended.as_ref().ok_or_else(|| ReadReason::Missing("<AppendedData>".into()))?;
+                Place::Appended { offset: array.attributes.count("offset")? as u64, base64: appended.base64 }
+            }
+        })
+    }
+
     fn source<'b>(&'b self, array: &'b Array<'a>) -> Result<Source<'b>, ReadReason> {
         match array.encoding() {
             Encoding::Ascii | Encoding::Binary => Ok(Source::base64(array.text.as_bytes())),
@@ -300,6 +318,16 @@ impl<'a> Document<'a> {
             }
         }
     }
+}
+
+/// Where the values of an array are.
+pub(super) enum Place<'a> {
+    /// In the text, as numbers.
+    Numbers,
+    /// In this text, in base64.
+    Inline(&'a str),
+    /// In the appended data, from this byte on.
+    Appended { offset: u64, base64: bool },
 }
 
 /// The error of an array that has more bytes than can be counted.

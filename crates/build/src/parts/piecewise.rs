@@ -21,7 +21,7 @@ use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use tetralod::geom::{Bounds, Lattice, WIDE_BITS, bits_of};
-use tetralod::mesh::{Extremes, FACES, Field, MAX_TETS, MOST_LABELS, MeshInput, MeshPiece, TetMesh};
+use tetralod::mesh::{BitSet, Extremes, FACES, Field, MAX_TETS, MOST_LABELS, MeshInput, MeshPiece, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
 /// Where [`Piecewise`] puts what it does not keep in memory, by names of letters, digits and dashes.
@@ -67,17 +67,18 @@ struct Sums {
     cell_fields: Vec<Field>,
     /// Fields that nobody asked for, as the first piece has them.
     input: MeshInput,
-    /// Points that are in several pieces.
-    shared: Vec<u32>,
-    /// Points that no tetrahedron of the first piece that has them uses, and shared points that one of a later piece uses.
-    unused: Vec<u32>,
-    used: Vec<u32>,
+    /// Points that tetrahedra use, and those that tetrahedra of several pieces use.
+    used: BitSet,
+    shared: BitSet,
     /// Of positions, tetrahedra, and each field.
     hashers: [crc32fast::Hasher; 2],
     of_fields: Vec<crc32fast::Hasher>,
     /// The values of each field that is a label.
     labels: Vec<BTreeSet<u64>>,
 }
+
+/// So many points of several pieces are never too many.
+const MANY_SHARED: usize = 1 << 20;
 
 /// Why pieces have to be put together first.
 fn whole<T>(why: &'static str) -> Result<T, PartsError> {
@@ -110,9 +111,8 @@ impl<'a> Piecewise<'a> {
             extremes: Vec::new(),
             cell_fields: Vec::new(),
             input: MeshInput::default(),
-            shared: Vec::new(),
-            unused: Vec::new(),
-            used: Vec::new(),
+            used: BitSet::default(),
+            shared: BitSet::default(),
             hashers: Default::default(),
             of_fields: Vec::new(),
             labels: Vec::new(),
@@ -131,19 +131,7 @@ impl<'a> Piecewise<'a> {
         }
         let sums = &mut self.sums;
         let first = sums.points;
-        let mut used = vec![false; points.len()];
-        mesh.tets.iter().flatten().for_each(|&v| used[v as usize] = true);
-        for (&number, used) in points.iter().zip(used) {
-            match (number >= first, used) {
-                (true, true) => {}
-                (true, false) => sums.unused.push(number),
-                (false, used) => {
-                    sums.shared.push(number);
-                    sums.used.extend(used.then_some(number));
-                }
-            }
-        }
-        if self.pieces == 0 {
+        if first == 0 {
             sums.fields = mesh.fields.iter().map(Field::without_values).collect();
             sums.cell_fields = mesh.cell_fields.iter().map(Field::without_values).collect();
             sums.input.other_fields.clone_from(&mesh.input.other_fields);
@@ -154,6 +142,9 @@ impl<'a> Piecewise<'a> {
         }
         let is_new = |i: &usize| points[*i] >= first;
         let new: Vec<usize> = (0..points.len()).filter(is_new).collect();
+        if new.iter().any(|&i| mesh.positions[i].iter().any(|x| !x.is_finite())) {
+            return whole("positions are not finite");
+        }
         for &i in &new {
             sums.bounds = sums.bounds.with(mesh.positions[i]);
             mesh.positions[i].iter().for_each(|x| sums.hashers[0].update(&x.to_le_bytes()));
@@ -190,11 +181,18 @@ impl<'a> Piecewise<'a> {
             return Err(BuildError::TooLarge.into());
         }
         sums.points = end as u32;
-        let TetMesh { positions, fields, tets, .. } = mesh;
-        let values = fields.into_iter().map(|field| field.values).collect();
+        if mesh.tets.is_empty() {
+            return Ok(());
+        }
+        let stored = Stored::of(points, mesh);
+        for &number in &stored.points {
+            if !sums.used.insert(number) {
+                sums.shared.insert(number);
+            }
+        }
         let index = self.pieces;
         self.pieces += 1;
-        self.keep(&format!("piece-{index}"), &Stored { points, positions, values, tets })
+        self.keep(&format!("piece-{index}"), &stored)
     }
 
     /// Parts what was added, as [`part`](super::part).
@@ -260,14 +258,15 @@ impl<'a> Piecewise<'a> {
 
     /// The points of several pieces, ascending. Each point must be used.
     fn shared(&mut self) -> Result<Vec<u32>, PartsError> {
-        let Sums { shared, unused, used, .. } = &mut self.sums;
-        let mut shared = std::mem::take(shared);
-        shared.sort_unstable();
-        shared.dedup();
-        let mut used = std::mem::take(used);
-        used.sort_unstable();
-        if unused.iter().any(|number| used.binary_search(number).is_err()) {
+        let Sums { shared, used, points, .. } = &mut self.sums;
+        let (shared, used) = (std::mem::take(shared), std::mem::take(used));
+        if used.words().iter().map(|word| word.count_ones()).sum::<u32>() < *points {
             return whole("some points belong to no cell");
+        }
+        let shared: Vec<u32> = (0..*points).filter(|&number| shared.has(number)).collect();
+        // What is known of each such point takes more than the whole takes for a point.
+        if shared.len() > MANY_SHARED && shared.len() > *points as usize / 2 {
+            return whole("its pieces have most points in common");
         }
         Ok(shared)
     }

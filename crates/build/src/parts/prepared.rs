@@ -22,6 +22,35 @@ pub(super) struct Stored {
     pub tets: Vec<[u32; 4]>,
 }
 
+impl Stored {
+    /// What is kept of a piece: points that none of its tetrahedra uses tell nothing of it.
+    pub fn of(mut points: Vec<u32>, mesh: TetMesh) -> Self {
+        let TetMesh { mut positions, fields, mut tets, .. } = mesh;
+        let mut values: Vec<Vec<f64>> = fields.into_iter().map(|field| field.values).collect();
+        let mut used = vec![false; points.len()];
+        tets.iter().flatten().for_each(|&v| used[v as usize] = true);
+        if used.contains(&false) {
+            let mut next = 0;
+            let place = |&used: &bool| {
+                next += u32::from(used);
+                next.wrapping_sub(1)
+            };
+            let places: Vec<u32> = used.iter().map(place).collect();
+            tets.iter_mut().for_each(|tet| *tet = tet.map(|v| places[v as usize]));
+            keep(&mut points, &used);
+            keep(&mut positions, &used);
+            values.iter_mut().for_each(|values| keep(values, &used));
+        }
+        Self { points, positions, values, tets }
+    }
+}
+
+/// Leaves the items at these places.
+fn keep<T>(items: &mut Vec<T>, places: &[bool]) {
+    let mut places = places.iter();
+    items.retain(|_| places.next() == Some(&true));
+}
+
 /// What is the same for all pieces, once the lattices are known.
 pub(super) struct Whole {
     pub lattice: Lattice,

@@ -100,7 +100,10 @@ fn write(
 
 fn pieces(path: &Path) -> Vec<MeshPiece> {
     let options = ReadOptions { cells: CellData::Names, ..ReadOptions::default() };
-    let pieces = Pieces::open(path, &options).expect("a list").expect("of pieces");
+    all_of(&Pieces::open(path, &options).expect("a list").expect("of pieces"))
+}
+
+fn all_of(pieces: &Pieces) -> Vec<MeshPiece> {
     let mut all = Vec::new();
     pieces
         .for_each::<io::ReadError>(&mut |piece| {
@@ -231,6 +234,38 @@ fn pieces_have_the_parts_of_their_whole() {
                         assert!(found == expected, "{name}, {how}, {parts}: {:?} differs", found.node());
                     }
                     assert_eq!(found.1.len(), parts as usize);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn ranges_of_cells_have_the_parts_of_their_whole() {
+    let folder = Folder::new("piecewise-ranges");
+    for (name, mesh) in meshes() {
+        let mut bytes = Vec::new();
+        io::write_vtu(&mesh, &mut bytes).expect("bytes");
+        let path = folder.0.join("mesh.vtu");
+        fs::write(&path, bytes).expect("a file");
+        let mut whole = io::read(&path).expect("a mesh");
+        mark_labels(&mut whole, &[], &BuildConfig::default()).expect("no names");
+        for most in [whole.tets.len() as u64 / 7, 100] {
+            let options = ReadOptions { cells: CellData::Names, ..ReadOptions::default() };
+            let pieces = Pieces::open_ranges(&path, &options, Some(most)).expect("a file").expect("ranges");
+            let mut pieces = all_of(&pieces);
+            assert!(pieces.len() > 7);
+            for piece in &mut pieces {
+                mark_labels(&mut piece.mesh, &[], &BuildConfig::default()).expect("no names");
+            }
+            for (all_fields, parts) in [(true, 1), (true, 8), (false, 4)] {
+                let config = BuildConfig { all_fields, ..BuildConfig::default() };
+                let expected = parted(&whole, &config, parts);
+                let found = part_pieces(&pieces, &config, parts)
+                    .unwrap_or_else(|error| panic!("{name}, {most}, {parts}: {error}"));
+                assert_eq!(found.0, expected.0, "{name}, {most}, {parts}");
+                for (found, expected) in found.1.iter().zip(&expected.1) {
+                    assert!(found == expected, "{name}, {most}, {parts}: {:?} differs", found.node());
                 }
             }
         }

@@ -2,6 +2,7 @@
 //!
 //! Files on disk are read by ranges, never as a whole. What a read may allocate follows from the size of the file.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use hdf5_reader::storage::DynStorage;
@@ -81,6 +82,15 @@ pub(crate) fn times(files: &FilesOf<'_>) -> Result<Vec<f64>, ReadError> {
         Content::Exodus(file) => exodus::times(&file),
     });
     times.map_err(|error| in_file(error, &files.name()))
+}
+
+/// Opens the file at a path if it is VTKHDF.
+pub(super) fn open_vtkhdf(path: &Path, options: &ReadOptions) -> Result<Option<Hdf5File>, ReadError> {
+    let Some(storage) = open(&FilesOf::on_disk(path, &options.memory)) else { return Ok(None) };
+    Ok(match content(storage, options.memory.most())? {
+        Content::Vtkhdf(file) => Some(file),
+        Content::Exodus(_) => None,
+    })
 }
 
 fn read_from(storage: DynStorage, options: &ReadOptions) -> Result<TetMesh, ReadError> {

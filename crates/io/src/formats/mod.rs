@@ -27,6 +27,8 @@ pub(super) mod tetgen;
 mod volume;
 #[cfg(feature = "hdf5")]
 mod vtkhdf;
+#[cfg(feature = "hdf5")]
+pub(super) mod vtkhdf_ranges;
 
 use std::path::Path;
 

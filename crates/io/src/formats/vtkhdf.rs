@@ -37,9 +37,12 @@ const FACE_COUNTS: [&str; 3] =
 const FACE_BEGINNINGS: [&str; 3] =
     ["FaceOffsetsOffsets", "FaceConnectivityOffsets", "PolyhedronToFaceIdOffsets"];
 
+/// The type of data sets with cells.
+pub(super) const UNSTRUCTURED: &str = "UnstructuredGrid";
+
 /// A file, and which of its steps is read.
-struct Reader<'a> {
-    file: &'a Hdf5File,
+pub(super) struct Reader<'a> {
+    pub file: &'a Hdf5File,
     options: &'a ReadOptions,
     /// None without steps.
     step: Option<u64>,
@@ -59,47 +62,35 @@ pub(super) fn times(file: &Hdf5File) -> Result<Vec<f64>, ReadError> {
 
 /// Reads a mesh or grid.
 pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let place = || ROOT.to_owned();
-    let times = times(file)?;
-    let step = (!times.is_empty()).then_some(options.step as u64);
-    let mut reader = Reader { file, options, step, axes: 1, known: RefCell::default() };
-    options.expect_step(times.len()).at(place)?;
-    let version = reader.attribute("Version").at(place)?;
-    if !version.first().is_some_and(|major| MAJOR_VERSIONS.contains(major)) {
-        let what = format!("version {version:?} of VTKHDF");
-        return Err(ReadReason::unsupported(what, "write it as version 2, or as .vtu")).at(place);
-    }
-    let root = file.group(ROOT).map_err(reason).at(place)?;
-    let kind = root.attribute("Type").and_then(|kind| kind.read_string()).map_err(reason).at(place)?;
-    let mut mesh = match kind.trim_end_matches('\0') {
-        "UnstructuredGrid" => reader.unstructured()?,
+    let (mut reader, kind, time) = Reader::of(file, options)?;
+    let mut mesh = match kind.as_str() {
+        UNSTRUCTURED => reader.unstructured()?,
         "ImageData" => {
-            reader.axes = 3 + usize::from(step.is_some());
+            reader.axes = 3 + usize::from(reader.step.is_some());
             reader.image()?
         }
         other => {
             let what = format!("a data set of type {other}");
             let remedy = "give an UnstructuredGrid or ImageData";
-            return Err(ReadReason::unsupported(what, remedy)).at(place);
+            return Err(ReadReason::unsupported(what, remedy)).at(|| ROOT.to_owned());
         }
     };
-    let time = times.get(options.step).copied();
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
 }
 
 /// Reads what is wanted of an array of so many components.
-type ReadValues<'a> = &'a dyn Fn(&Dataset, usize) -> Result<Vec<f64>, ReadReason>;
+pub(super) type ReadValues<'a> = &'a dyn Fn(&Dataset, usize) -> Result<Vec<f64>, ReadReason>;
 
 /// Where a piece begins in the arrays, and how much of each is its own.
 #[derive(Clone, Debug)]
-struct Piece {
-    points: Range<u64>,
-    cells: Range<u64>,
+pub(super) struct Piece {
+    pub points: Range<u64>,
+    pub cells: Range<u64>,
     /// In the list of the points of cells.
-    ids: Range<u64>,
+    pub ids: Range<u64>,
     /// In the list of where cells begin and end.
-    offsets: Range<u64>,
+    pub offsets: Range<u64>,
     /// In the lists of where faces end, of their points, and of the faces of polyhedra.
     faces: [Range<u64>; 3],
     /// The first of its rows in arrays at points and at cells, where they have no beginnings of their own.
@@ -108,13 +99,35 @@ struct Piece {
     before: [u64; 2],
 }
 
+impl<'a> Reader<'a> {
+    /// A reader of the step that is asked for, the type of the data set, and its time.
+    pub fn of(
+        file: &'a Hdf5File,
+        options: &'a ReadOptions,
+    ) -> Result<(Self, String, Option<f64>), ReadError> {
+        let place = || ROOT.to_owned();
+        let times = times(file)?;
+        let step = (!times.is_empty()).then_some(options.step as u64);
+        let reader = Self { file, options, step, axes: 1, known: RefCell::default() };
+        options.expect_step(times.len()).at(place)?;
+        let version = reader.attribute("Version").at(place)?;
+        if !version.first().is_some_and(|major| MAJOR_VERSIONS.contains(major)) {
+            let what = format!("version {version:?} of VTKHDF");
+            return Err(ReadReason::unsupported(what, "write it as version 2, or as .vtu")).at(place);
+        }
+        let root = file.group(ROOT).map_err(reason).at(place)?;
+        let kind = root.attribute("Type").and_then(|kind| kind.read_string()).map_err(reason).at(place)?;
+        Ok((reader, kind.trim_end_matches('\0').to_owned(), times.get(options.step).copied()))
+    }
+}
+
 impl Reader<'_> {
-    fn dataset(&self, path: &str) -> Result<Dataset, ReadReason> {
+    pub fn dataset(&self, path: &str) -> Result<Dataset, ReadReason> {
         self.file.dataset(&format!("{ROOT}/{path}")).map_err(reason)
     }
 
     /// A dataset that need not be there.
-    fn dataset_if(&self, path: &str) -> Result<Option<Dataset>, ReadReason> {
+    pub fn dataset_if(&self, path: &str) -> Result<Option<Dataset>, ReadReason> {
         let (folder, name) = path.rsplit_once('/').unwrap_or(("", path));
         if !self.has_member(folder, name)? {
             return Ok(None);
@@ -180,7 +193,7 @@ impl Reader<'_> {
     }
 
     /// The pieces of this step.
-    fn pieces(&self) -> Result<Vec<Piece>, ReadReason> {
+    pub fn pieces(&self) -> Result<Vec<Piece>, ReadReason> {
         let list = |name: &str| -> Result<Vec<u64>, ReadReason> {
             all_integers(&self.dataset(name)?)?.into_iter().map(count).collect()
         };
@@ -258,7 +271,12 @@ impl Reader<'_> {
     }
 
     /// Reads a piece. Its points are numbered as `numbers` says.
-    fn piece(&self, piece: &Piece, number: usize, numbers: NumberPoints<'_>) -> Result<TetMesh, ReadError> {
+    pub fn piece(
+        &self,
+        piece: &Piece,
+        number: usize,
+        numbers: NumberPoints<'_>,
+    ) -> Result<TetMesh, ReadError> {
         let place = |array: &str| format!("piece {number}, {ROOT}/{array}");
         let mut listed = self.cells(piece).at(|| place("Types, Offsets and Connectivity"))?;
         if let Some(listed) = &mut listed {
@@ -289,7 +307,7 @@ impl Reader<'_> {
         Ok(TetMesh { positions, fields, tets: split.tets, cell_fields, input, ..TetMesh::default() })
     }
 
-    fn positions(&self, piece: &Piece) -> Result<Vec<[f64; 3]>, ReadReason> {
+    pub fn positions(&self, piece: &Piece) -> Result<Vec<[f64; 3]>, ReadReason> {
         let points = self.dataset("Points")?;
         expect_count("components of the points", 3_u64, row_length(&points)?)?;
         let count = piece.points.end.saturating_sub(piece.points.start);
@@ -355,7 +373,7 @@ impl Reader<'_> {
     }
 
     /// The rows of an array that are a piece's.
-    fn rows_of(&self, group: &str, name: &str, piece: &Piece) -> Result<Range<u64>, ReadReason> {
+    pub fn rows_of(&self, group: &str, name: &str, piece: &Piece) -> Result<Range<u64>, ReadReason> {
         let (of, own) = if group == "PointData" { (0, &piece.points) } else { (1, &piece.cells) };
         let first = self.beginning(&format!("{group}Offsets/{name}"))?.unwrap_or(piece.first[of]);
         let start = first.saturating_add(piece.before[of]);
@@ -373,7 +391,7 @@ impl Reader<'_> {
     }
 
     /// The fields in a group, whose values `values` reads, given how many components there are, and those that nobody asked for.
-    fn collect(
+    pub fn collect(
         &self,
         group: &str,
         at_points: &[Field],

@@ -1,4 +1,4 @@
-"""Writes pieces.vtkhdf, polyhedra.vtkhdf, steps.vtkhdf, image.vtkhdf, dense.vtkhdf, netcdf4.exo, and two files with groups in circles: small files in
+"""Writes pieces.vtkhdf, cells.vtkhdf, polyhedra.vtkhdf, steps.vtkhdf, image.vtkhdf, dense.vtkhdf, netcdf4.exo, and two files with groups in circles: small files in
 HDF5 in the layouts that programs write.
 
 Needs h5py. The same calls give the same bytes.
@@ -35,6 +35,25 @@ def pieces():
     at_points.create_dataset("sum", data=points.sum(1).astype(">f8"), **packed)
     at_points["v"] = points * 2
     at_cells["material"] = np.array([3, 5, 7], "u2")
+    file.close()
+
+
+def cells():
+    """Four cubes in a row, one of them as tetrahedra, between them a square: one piece, in small chunks."""
+    file, group = root("cells.vtkhdf", "UnstructuredGrid", ("v110", "v110"))
+    points = np.array([[x, y, z] for x in range(5) for y in (0, 1) for z in (0, 1)], "f8")
+    cube = np.array([0, 4, 6, 2, 1, 5, 7, 3])
+    tets = [[0, 1, 3, 7], [0, 1, 7, 5], [0, 2, 7, 3], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 7, 6]]
+    listed = [cube, cube[:4], *(np.array(tets) + 4), cube + 8, cube + 12]
+    for name, number in {"Points": 20, "Cells": len(listed), "ConnectivityIds": sum(map(len, listed))}.items():
+        group[f"NumberOf{name}"] = np.array([number], "i8")
+    group.create_dataset("Points", data=points, chunks=(3, 3), compression="gzip")
+    group.create_dataset("Connectivity", data=np.concatenate(listed).astype("u4"), chunks=(5,), compression="gzip")
+    group["Offsets"] = np.cumsum([0, *map(len, listed)]).astype("i8")
+    group["Types"] = np.array([12, 9, *[10] * 6, 12, 12], "u1")
+    at_points = group.create_group("PointData")
+    at_points["sum"], at_points["v"] = points.sum(1), (points * 2).astype("f4")
+    group.create_group("CellData")["material"] = np.arange(len(listed), dtype="u2")
     file.close()
 
 
@@ -162,5 +181,5 @@ def cycles():
             group = child
 
 
-for write in [pieces, polyhedra, steps, image, dense, exodus, cycles]:
+for write in [pieces, cells, polyhedra, steps, image, dense, exodus, cycles]:
     write()

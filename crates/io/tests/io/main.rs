@@ -19,6 +19,8 @@ mod odd;
 #[cfg(not(target_arch = "wasm32"))]
 mod pieces;
 mod polyhedra;
+#[cfg(not(target_arch = "wasm32"))]
+mod ranges;
 mod real;
 mod surfaces;
 mod survey;

@@ -1,0 +1,256 @@
+//! VTK XML unstructured grids by ranges of cells: what the file is on a disk is read by parts, but for its XML text.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::ops::Range;
+use std::path::Path;
+
+use crate::cells::Indices;
+use crate::error::{At, ReadError, ReadReason, Stop};
+use crate::fields::Collector;
+use crate::file_kind::without_mark;
+use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE};
+use crate::number::points_from;
+use crate::ranges::{Before, Grid, Ranges, Rows};
+use crate::skeleton::{Skeleton, left_in_file};
+use crate::stored::{Bytes, Stored};
+use crate::vtu::{PieceReader, readers};
+use crate::xml::{Array, Document, Place};
+use crate::{CellData, PieceCounts, ReadOptions, format_of, packed};
+use tetralod::mesh::{MeshInput, MeshPiece, TetMesh};
+
+/// Bytes that are read at a time where all are passed over.
+const STEP: usize = 1 << 20;
+
+/// A file whose text was read.
+#[derive(Debug)]
+pub(super) struct VtuFile {
+    file: File,
+    skeleton: Skeleton,
+    /// Those of each of its pieces.
+    pieces: Vec<Ranges>,
+    points: u64,
+    fields: u64,
+}
+
+impl VtuFile {
+    /// Opens a file whose ranges become so many tetrahedra at most, or as many as take the least memory; none if it is another one.
+    pub fn open(path: &Path, options: &ReadOptions, most: Option<u64>) -> Result<Option<Self>, Stop> {
+        let io_error = |error: std::io::Error| ReadReason::Io(error.to_string());
+        let file = File::open(path).map_err(io_error)?;
+        // Pipes and the like are read once.
+        if !file.metadata().map_err(io_error)?.is_file() {
+            return Ok(None);
+        }
+        let skeleton = {
+            let mut reader = BufReader::with_capacity(STEP, &file);
+            let head = std::io::BufRead::fill_buf(&mut reader).map_err(io_error)?;
+            if packed::is_gzip(head) || format_of(head) != Some("vtu") {
+                return Ok(None);
+            }
+            Skeleton::read(reader)?
+        };
+        let mut opened = Self { file, skeleton, pieces: Vec::new(), points: 0, fields: 0 };
+        let document = opened.document()?;
+        let (mut pieces, mut points, mut fields) = (Vec::new(), 0, 0);
+        for reader in readers(&document, options) {
+            let grid = opened.grid(&reader)?;
+            pieces.push(Ranges::of(&grid, most)?);
+            // What cannot be read by parts is found before any is.
+            let some = grid.fields(&Rows::Range(0..grid.counts[0].min(1)), options)?;
+            points += grid.counts[0];
+            fields = some.fields.len() as u64;
+        }
+        drop(document);
+        (opened.pieces, opened.points, opened.fields) = (pieces, points, fields);
+        Ok(Some(opened))
+    }
+
+    /// All ranges.
+    pub fn ranges(&self) -> impl Iterator<Item = &Range<u64>> {
+        self.pieces.iter().flat_map(|piece| &piece.ranges)
+    }
+
+    pub fn counts(&self) -> PieceCounts {
+        PieceCounts {
+            points: self.points,
+            tetrahedra: self.pieces.iter().map(|piece| piece.tets).sum(),
+            pieces: self.ranges().count() as u64,
+            largest: self.pieces.iter().map(|piece| piece.largest).max().unwrap_or(0),
+            fields: self.fields,
+        }
+    }
+
+    /// Passes on the mesh piece by piece.
+    pub fn for_each(
+        &self,
+        options: &ReadOptions,
+        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
+    ) -> Result<(), Stop> {
+        let document = self.document()?;
+        let time = self.time(&document);
+        let mut before = Before::default();
+        for (reader, ranges) in readers(&document, options).zip(&self.pieces) {
+            let grid = self.grid(&reader)?;
+            before.for_each(&grid, &ranges.ranges, options, &mut |mut piece| {
+                let TetMesh { fields, cell_fields, .. } = &mut piece.mesh;
+                fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
+                each(piece)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn document(&self) -> Result<Document<'_>, ReadError> {
+        Document::parse(without_mark(&self.skeleton.text))
+    }
+
+    /// The time of the data set, as [`Document::time`].
+    fn time(&self, document: &Document<'_>) -> Option<f64> {
+        let array = document.time_array()?;
+        let time = match self.stored(document, array, 1) {
+            Ok(stored) => stored.floats(0..1).ok()?.first().copied(),
+            Err(_) => document.time(),
+        };
+        time.filter(|time| time.is_finite())
+    }
+
+    /// Opens an array of so many numbers.
+    fn stored<'a>(
+        &'a self,
+        document: &'a Document<'_>,
+        array: &'a Array<'_>,
+        count: u64,
+    ) -> Result<Stored<'a>, Stop> {
+        let open = || {
+            let Some(number) = array.number_type() else {
+                return Err(Stop::Whole("an array that is needed has no numbers"));
+            };
+            let file = &self.file;
+            let bytes = match document.place_of(array)? {
+                Place::Numbers => return Err(Stop::Whole("its numbers are text")),
+                Place::Inline(text) => match left_in_file(text) {
+                    Some((start, end)) => (Bytes::File { file, start, end }, true, true),
+                    None => (Bytes::Memory(text.trim_ascii().as_bytes()), true, true),
+                },
+                Place::Appended { offset, base64 } => {
+                    let end = file.metadata().map_err(|error| ReadReason::Io(error.to_string()))?.len();
+                    let start = self.skeleton.data.saturating_add(offset).min(end);
+                    (Bytes::File { file, start, end }, base64, false)
+                }
+            };
+            Stored::open(bytes, document.framing, number, count)
+        };
+        open().map_err(|stop| stop.at(|| array.place()))
+    }
+
+    fn grid<'a>(&'a self, reader: &'a PieceReader<'a, 'a>) -> Result<VtuGrid<'a>, Stop> {
+        let count =
+            |name: &str| reader.piece.attributes.count(name).map(|count| count as u64).at(|| reader.place());
+        let counts = [count("NumberOfPoints")?, count("NumberOfCells")?];
+        let marks = ["PointData", "CellData"].into_iter().flat_map(|section| reader.piece.section(section));
+        if marks.into_iter().any(|array| [GHOST_TYPE, GHOST_LEVELS].contains(&array.name())) {
+            return Err(Stop::Whole("it marks cells or points as ghosts"));
+        }
+        if counts.contains(&0) {
+            return Err(Stop::Whole("it has no cells"));
+        }
+        let open = |array: &'a Array<'a>, count: u64| {
+            let stored = self.stored(reader.document, array, count);
+            stored.map(|stored| Of { array, stored })
+        };
+        let [points, cells] = counts;
+        let ends = open(reader.of_cells("offsets")?, cells)?;
+        let last = ends.stored.integers(cells - 1..cells).at(|| ends.array.place())?;
+        let length = u64::try_from(last.first().copied().unwrap_or(0));
+        let length = length.map_err(|_| ReadReason::Syntax(format!("the last cell ends at {last:?}")));
+        let length = length.at(|| ends.array.place())?;
+        Ok(VtuGrid {
+            file: self,
+            reader,
+            counts,
+            types: open(reader.of_cells("types")?, cells)?,
+            connectivity: open(reader.of_cells("connectivity")?, length)?,
+            positions: open(reader.points_array()?, points.saturating_mul(3))?,
+            ends,
+        })
+    }
+}
+
+/// An array of numbers.
+struct Of<'a> {
+    array: &'a Array<'a>,
+    stored: Stored<'a>,
+}
+
+/// A piece of a file.
+struct VtuGrid<'a> {
+    file: &'a VtuFile,
+    reader: &'a PieceReader<'a, 'a>,
+    counts: [u64; 2],
+    types: Of<'a>,
+    ends: Of<'a>,
+    connectivity: Of<'a>,
+    positions: Of<'a>,
+}
+
+impl Of<'_> {
+    fn integers(&self, range: Range<u64>) -> Result<Vec<i64>, ReadError> {
+        self.stored.integers(range).at(|| self.array.place())
+    }
+}
+
+/// The values in some rows of an array.
+fn rows_of(stored: &Stored<'_>, rows: &Rows<'_>, components: usize) -> Result<Vec<f64>, ReadReason> {
+    let each = components as u64;
+    rows.values(components, |range| stored.floats(range.start * each..range.end * each))
+}
+
+impl Grid for VtuGrid<'_> {
+    fn counts(&self) -> [u64; 2] {
+        self.counts
+    }
+
+    fn types(&self, cells: Range<u64>) -> Result<Vec<i64>, ReadError> {
+        self.types.integers(cells)
+    }
+
+    fn ends(&self, cells: Range<u64>) -> Result<Vec<i64>, ReadError> {
+        self.ends.integers(cells)
+    }
+
+    fn points_of_cells(&self, part: Range<u64>) -> Result<Indices<'static>, ReadError> {
+        let Of { array, stored } = &self.connectivity;
+        stored.indices(part).at(|| array.place())
+    }
+
+    fn positions(&self, rows: &Rows<'_>) -> Result<Vec<[f64; 3]>, ReadError> {
+        let Of { array, stored } = &self.positions;
+        Ok(points_from(&rows_of(stored, rows, 3).at(|| array.place())?))
+    }
+
+    fn fields(&self, rows: &Rows<'_>, options: &ReadOptions) -> Result<TetMesh, Stop> {
+        let Self { file, reader, counts, .. } = self;
+        let read = &mut |array: &Array<'_>, components: usize| {
+            let count = counts[0].saturating_mul(components as u64);
+            let stored = file.stored(reader.document, array, count)?;
+            rows_of(&stored, rows, components).map_err(|reason| Stop::from(reason).at(|| array.place()))
+        };
+        let [fields, other_fields] = reader.collect_by(Collector::new(options), "PointData", read)?;
+        // At cells there are names alone.
+        let cell_fields = match options.cells {
+            CellData::LeaveOut => Vec::new(),
+            _ => reader.field_names("CellData")?,
+        };
+        let input = MeshInput { other_fields, ..MeshInput::default() };
+        Ok(TetMesh { fields, cell_fields, input, ..TetMesh::default() })
+    }
+
+    fn place(&self, of: &str) -> String {
+        let piece = self.reader.place();
+        match of {
+            "PointData" | "Points" => format!("{piece}, <{of}>"),
+            array => format!("{piece}, <Cells>, array \"{array}\""),
+        }
+    }
+}
