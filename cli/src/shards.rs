@@ -4,8 +4,9 @@ use super::{files, parse};
 use anyhow::{Context, Result, ensure};
 use std::fs::{self, File};
 use std::io::{self, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
-use tetralod::stream::shard_suffix;
+use tetralod::stream::{ShardedFile, shard_suffix};
 
 /// Whether an MT file is written in shards.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
@@ -22,11 +23,12 @@ const MOST: u64 = 10_000;
 
 impl Sharding {
     /// The MT file that `write` writes, at the path that it is given, and whose length it returns, comes to `path`: whole or in shards. Shards
-    /// of an older file that are left over are removed.
+    /// of the file that was there are removed if they are left over; files that only have such names are not.
     pub fn write(self, path: &Path, write: impl FnOnce(&Path) -> Result<u64>) -> Result<u64> {
+        let older = older_shards(path);
         let Some(size) = self.size() else {
             let bytes = write(path)?;
-            files::uninterrupted(|| remove_from(path, 1))?;
+            files::uninterrupted(|| remove_all(path, 1..older))?;
             return Ok(bytes);
         };
         let is_other = fs::metadata(path).is_ok_and(|found| !found.is_file());
@@ -40,7 +42,7 @@ impl Sharding {
             let bytes = write(&whole)?;
             let count = cut(&whole, size)?;
             (0..count).try_for_each(|number| files::check_inputs(&shard(path, number)))?;
-            let placed = files::uninterrupted(|| place(&whole, path, count));
+            let placed = files::uninterrupted(|| place(&whole, path, count..older));
             placed.with_context(|| format!("{} could not be written", path.display()))?;
             Ok(bytes)
         })
@@ -75,21 +77,32 @@ fn cut(path: &Path, size: u64) -> Result<u64> {
     Ok(count)
 }
 
-/// Moves shards to their places. At no moment is there a first one beside others that are not its own.
-fn place(from: &Path, to: &Path, count: u64) -> io::Result<()> {
+/// Moves shards to their places: as many as come before those of an older file that are left over. At no moment is there a first one beside
+/// others that are not its own.
+fn place(from: &Path, to: &Path, left_over: Range<u64>) -> io::Result<()> {
     if shard(to, 1).exists() {
         remove(to)?;
     }
-    for number in (0..count).rev() {
+    for number in (0..left_over.start).rev() {
         fs::rename(shard(from, number), shard(to, number))?;
     }
-    remove_from(to, count)
+    remove_all(to, left_over)
 }
 
-/// Removes the shards from this number on, the last one first: so none is left behind a gap.
-fn remove_from(path: &Path, first: u64) -> io::Result<()> {
-    let end = (first..).find(|&number| !shard(path, number).exists()).unwrap_or(first);
-    (first..end).rev().try_for_each(|number| remove(&shard(path, number)))
+/// In how many shards the MT file at a path is; 1 if there is none.
+fn older_shards(path: &Path) -> u64 {
+    // Pipes are not opened twice.
+    if !path.is_file() {
+        return 1;
+    }
+    let none = |_: &str| Err(io::ErrorKind::NotFound.into());
+    let opened = File::open(path).and_then(|file| ShardedFile::new(file, none));
+    opened.map_or(1, |file| file.count().min(MOST))
+}
+
+/// Removes shards.
+fn remove_all(path: &Path, numbers: Range<u64>) -> io::Result<()> {
+    numbers.rev().try_for_each(|number| remove(&shard(path, number)))
 }
 
 /// Removes a file, if it is there.

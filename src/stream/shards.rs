@@ -100,6 +100,11 @@ impl<R: Read + Seek, F: FnMut(&str) -> io::Result<R>> ShardedFile<R, F> {
         Ok(Self { first, open, shards, other: None, at: 0 })
     }
 
+    /// In how many files it is; those behind the first may not be there.
+    pub fn count(&self) -> u64 {
+        self.shards.map_or(1, |shards| shards.number_at(shards.total - 1) + 1)
+    }
+
     /// The shard of this number, which has the length that it must have.
     fn shard(&mut self, shards: Shards, number: u64) -> io::Result<&mut R> {
         if number == 0 {

@@ -51,7 +51,11 @@ fn files_are_cut_put_together_and_read_as_one() {
     }
     good(&["verify", &cut, "--against", &grid, "--quick"]);
 
-    // What is left of an older file goes, and nothing else is left.
+    // What is left of an older file goes, and nothing else is left. A file that only has such a name stays.
+    let other = folder.path("back.mt.0001");
+    fs::write(&other, "mine").expect("a file");
+    good(&["convert", &cut, "--shard-size", "none", "-o", &back, "--quiet"]);
+    assert_eq!(fs::read(&other).expect("it is there"), b"mine");
     good(&["convert", &mt, "--shard-size", "100K", "-o", &cut, "--quiet"]);
     let (names, bytes) = shards(&folder, "cut.mt");
     assert_eq!(names.len(), whole.len().div_ceil(100 << 10));
