@@ -52,21 +52,24 @@ pub fn memory_needed_in_pieces(
 fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
     let of_points = |bytes: u64| points.saturating_mul(bytes);
     let of_tets = |bytes: u64| tetrahedra.saturating_mul(bytes);
-    let whole = of_tets(200).saturating_add(of_points(120 * fields.saturating_sub(1)));
+    let whole = of_tets(150).saturating_add(of_points(120 * fields.saturating_sub(1)));
     let part = whole / u64::from(parts.max(1)) * u64::from(at_a_time);
-    // What is left of the children is an eighth of their tetrahedra, with all of their points.
-    let joining = of_tets(200) / 8 + of_points(200 + 60 * fields);
-    let assembling = of_tets(60).saturating_add(of_points(90 + 30 * fields));
+    // What is left of the children is an eighth of their tetrahedra, with all of their points. But more stay where parts meet: at both sides of
+    // planes across a grid, two triangles for each square.
+    let side = libm::cbrt(points as f64);
+    let joining = |planes: f64| {
+        let at_interfaces = (4.0 * planes * side * side) as u64;
+        let left = at_interfaces.saturating_mul(LEFT_AT_INTERFACE as u64).max(tetrahedra / 8).min(tetrahedra);
+        left.saturating_mul(45).saturating_add(of_points(120 + 40 * fields))
+    };
+    let last = joining(6.0);
+    let assembling = of_points(250 + 30 * fields);
     // Of what has been freed, allocators keep some for each thread. One step alone is done by the thread that assembles.
     let joins = parts.div_ceil(8);
-    // But more stay where parts meet: at both sides of planes across a grid, two triangles for each square.
-    let planes = 3.0 * (libm::cbrt(parts.into()) - 1.0);
-    let triangles = 4.0 * planes * libm::cbrt(points as f64).powi(2);
-    let at_interfaces = (triangles as u64).saturating_mul(LEFT_AT_INTERFACE as u64).min(tetrahedra);
-    let first = joining.saturating_add(at_interfaces.saturating_sub(tetrahedra / 8).saturating_mul(200));
+    let first = joining(3.0 * (libm::cbrt(parts.into()) - 1.0));
     let side_by_side = if joins > 1 { first / u64::from(joins) * u64::from(at_a_time.min(joins)) } else { 0 };
     let kept = if at_a_time > 1 { part.max(side_by_side) / 2 } else { 0 };
-    part.max(joining.max(assembling).saturating_add(kept))
+    part.max(last.max(assembling).saturating_add(kept))
 }
 
 /// The memory in bytes that [`build`](super::build) and [`encode`](tetralod::format::encode) take at most for a mesh of so many points,
@@ -101,7 +104,7 @@ mod tests {
     #[test]
     fn what_threads_have_taken_counts_after_them() {
         // What one process takes for a grid of 65³ points, two parts at a time, of which glibc keeps some of what is free.
-        for (parts, measured) in [(4, 176_000_000), (8, 155_000_000)] {
+        for (parts, measured) in [(2, 138_000_000), (4, 110_000_000), (8, 95_000_000), (16, 97_000_000)] {
             let needed = memory_needed_in_parts([274_625, 1_572_864, 1], parts, 2);
             assert!(needed > measured, "{parts} parts: {needed}");
         }
