@@ -67,6 +67,9 @@ pub(super) fn readers<'a, 'd>(
     document.full_pieces().map(move |(number, piece)| PieceReader { document, piece, number, options })
 }
 
+/// Reads an array of so many components.
+pub(super) type ReadArray<'a, E> = &'a mut dyn FnMut(&Array<'_>, usize) -> Result<Vec<f64>, E>;
+
 /// Numbers the points of a piece, given their positions.
 pub(super) type NumberPoints<'a> = &'a mut dyn FnMut(&[[f64; 3]]) -> Result<Numbering, ReadReason>;
 
@@ -134,7 +137,7 @@ impl PieceReader<'_, '_> {
         &self,
         mut collector: Collector<'_>,
         section: &str,
-        values: &mut dyn FnMut(&Array<'_>, usize) -> Result<Vec<f64>, E>,
+        values: ReadArray<'_, E>,
     ) -> Result<[Vec<Field>; 2], E> {
         for array in self.piece.section(section).filter(|array| is_field(array)) {
             let Some(number) = array.number_type() else { continue };
