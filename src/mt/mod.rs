@@ -14,7 +14,7 @@
 //! | `mesh` | the current mesh: base mesh, tags, changed blocks, stars; it carries the state of a kind as a `KindState` without reading it |
 //! | `pages` | updates in pages, for half-edge MTs, which can come in parts |
 //! | `edge` | `store`; `predict` and `star` (residuals); `builder` (from plain vertex splits); `apply` |
-//! | `half_edge` | `store`; `star_code` (residuals of removers and inner faces); `scratch` and `new_star` (the star of an insertion); `places` (its geometry, prediction of levels); `builder` (appends updates to the mesh of those before) over `batch` (codes the stars of many at a time), `forest` (near vertices) and `removers`; `from_explicit`; `apply` |
+//! | `half_edge` | `store`; `star_code` (residuals of removers and inner faces); `scratch` and `new_star` (the star of an insertion); `places` (its geometry, prediction of levels); `builder` (appends updates to the mesh of those before, or to patches of it) over `batch` (codes the stars of many at a time), `forest` (near vertices) and `removers`; `from_explicit`; `apply` |
 //! | `vertex` | `store`, `limits`; `shape_code`, `cavity`, `cavity_fill`, `sphere_order`, `bit_string` (what an insertion removes); `tet_errors`; `growing` and `streaming` (while updates arrive); `from_explicit`; `apply` |
 //! | `vertex_tree` | the paper's node code [§5], in memory alone: `store` (what a node has, and what it cannot say), `tree_code` (the stream 0 / 10 / 11), `rebuild` (T_u from it); `from_explicit`; `apply` |
 //! | `explicit` | `store`, `face_occupancy`, `check`, `apply` |
