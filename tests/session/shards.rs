@@ -47,6 +47,9 @@ enum Way {
     Whole,
 }
 
+/// The requests that were made: the shard, and the bytes of it.
+type Asked = Rc<RefCell<Vec<(u64, Range<u64>)>>>;
+
 /// Those of a server that has a loader in front of it; with what has been asked of it.
 struct Served {
     shards: Shards,
@@ -55,7 +58,7 @@ struct Served {
     absent: ResponseHead<'static>,
     loader: Loader,
     now: u64,
-    asked: Rc<RefCell<Vec<(u64, Range<u64>)>>>,
+    asked: Asked,
 }
 
 impl Served {

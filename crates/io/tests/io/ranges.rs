@@ -184,6 +184,9 @@ fn cells_of_all_kinds_come_by_ranges() {
     check(&path, "time");
 }
 
+/// What is done to the values of an array.
+type Change<'a> = &'a dyn Fn(&mut Vec<f64>);
+
 #[test]
 fn errors_are_those_of_the_whole() {
     let folder = Folder::new("ranges-bad");
@@ -193,7 +196,7 @@ fn errors_are_those_of_the_whole() {
         let path = folder.write("a.vtu", &xml(RAW, "UnstructuredGrid", "", &[data]));
         (pieces(&path, 5), io::read(&path))
     };
-    let changes: [(&str, &dyn Fn(&mut Vec<f64>)); 5] = [
+    let changes: [(&str, Change<'_>); 5] = [
         ("connectivity", &|ids| ids[30] = 12.0),
         ("connectivity", &|ids| ids[47] = -1.0),
         ("offsets", &|ends| ends[8] = 37.0),
