@@ -66,7 +66,7 @@ impl<'a> Encoded<'a> {
         }
         let first = range.start / 3;
         let end = range.end.div_ceil(3).saturating_mul(4).min(self.bytes.len());
-        let text = self.bytes.read((4 * first).min(end)..end)?;
+        let text = self.bytes.read(first.saturating_mul(4).min(end)..end)?;
         let mut bytes = Vec::new();
         decode_groups(&text, &mut bytes)?;
         let skip = (range.start - 3 * first) as usize;
@@ -132,7 +132,9 @@ impl<'a> Stored<'a> {
         count: u64,
     ) -> Result<Self, Stop> {
         let open = || {
-            let needed = count.saturating_mul(number.size() as u64);
+            // So all numbers of it have a place that can be counted.
+            let needed = count.checked_mul(number.size() as u64);
+            let needed = needed.ok_or(ReadReason::TooLarge { what: "numbers".into(), limit: u64::MAX })?;
             let encoded = Encoded { bytes, base64 };
             let width = framing.width() as u64;
             let header = |first: u64, count: u64| -> Result<Vec<u64>, ReadReason> {
@@ -187,7 +189,8 @@ impl<'a> Stored<'a> {
             return Ok(Vec::new());
         }
         let Some(packed) = &self.packed else {
-            return self.data.read(self.first + range.start..self.first + range.end);
+            let place = |byte: u64| self.first.saturating_add(byte);
+            return self.data.read(place(range.start)..place(range.end));
         };
         packed.read(&self.data, self.first, range)
     }
@@ -239,7 +242,7 @@ impl Packed {
         let blocks = to_usize(range.start / self.size)?..to_usize(range.end.div_ceil(self.size))?;
         let end = |block: usize| block.checked_sub(1).map_or(0, |before| self.ends[before]);
         let begun = end(blocks.start);
-        let compressed = data.read(first + begun..first.saturating_add(end(blocks.end)))?;
+        let compressed = data.read(first.saturating_add(begun)..first.saturating_add(end(blocks.end)))?;
         let mut bytes = Vec::new();
         shares::append(&mut bytes, blocks.len(), BLOCKS, |share| {
             let mut part = Vec::new();

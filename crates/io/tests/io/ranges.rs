@@ -221,6 +221,17 @@ fn errors_are_those_of_the_whole() {
         assert_eq!(pieces(&folder.write(name, &bytes), 5), Ok(Err(None)), "{name}");
     }
     assert!(pieces(&folder.0.join("none.vtu"), 5).is_err());
+    // Counts that no file can have, which would not fit into numbers as bytes.
+    for name in ["NumberOfPoints=\"", "NumberOfCells=\""] {
+        let mut bytes = sample_vtu(RAW);
+        let at = bytes.windows(name.len()).position(|word| word == name.as_bytes()).unwrap() + name.len();
+        let length = bytes[at..].iter().position(|&byte| byte == b'"').unwrap();
+        bytes.splice(at..at + length, *b"2305843009213693953");
+        // As the data would say it, too.
+        let data = bytes.iter().position(|&byte| byte == b'_').unwrap() + 1;
+        bytes[data..].chunks_exact_mut(8).for_each(|number| number.fill(0xff));
+        assert!(pieces(&folder.write("e.vtu", &bytes), 5).is_err(), "{name}");
+    }
 }
 
 #[cfg(feature = "hdf5")]
