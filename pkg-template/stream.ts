@@ -130,12 +130,12 @@ function withShards(first: OpenSource, openNext: (url: string) => Promise<OpenSo
 /** The same errors as those of the loader, which reads files in parts. */
 function missingShard(number: number, from: number, total: number) {
   const what = `the file should have ${total} bytes, and those from ${from} on are missing`;
-  const why = `either it was cut off, or it is in shards and \`${shardSuffix(number)}\`, as its name ends, is not there`;
+  const why = `either it was cut off, or it is in shards, and the one whose name ends in \`${shardSuffix(number)}\` is not there`;
   return new TetralodError("truncated", `${what}: ${why}; copy it again, with all files whose names begin with its name`);
 }
 
 function wrongShard(number: number, found: number, expected: number) {
-  const what = `the shard \`${shardSuffix(number)}\`, as its name ends, has ${found} bytes instead of ${expected}`;
+  const what = `the shard whose name ends in \`${shardSuffix(number)}\` has ${found} bytes instead of ${expected}`;
   const why = "it was cut off, or belongs to another version of the file";
   const remedy = "copy all files again whose names begin with the name of the first one";
   return new TetralodError(found < expected ? "truncated" : "corrupt", `${what}: ${why}; ${remedy}`);

@@ -50,8 +50,8 @@ pub enum StreamError {
     Changed,
     /// The file ends where more should follow: it was cut off, or it is in shards, and one of them is not there.
     #[error(
-        "the file should have {total} bytes, and those from {from} on are missing: either it was cut off, or it is in shards and `{suffix}`, \
-         as its name ends, is not there; copy it again, with all files whose names begin with its name"
+        "the file should have {total} bytes, and those from {from} on are missing: either it was cut off, or it is in shards, and the \
+         one whose name ends in `{suffix}` is not there; copy it again, with all files whose names begin with its name"
     )]
     MissingShard {
         /// What stands behind the name of the file in that of the shard which was looked for.
@@ -63,7 +63,7 @@ pub enum StreamError {
     },
     /// A shard of the file has another length than it must have.
     #[error(
-        "the shard `{suffix}`, as its name ends, has {found} bytes instead of {expected}: it was cut off, or belongs to another version of \
+        "the shard whose name ends in `{suffix}` has {found} bytes instead of {expected}: it was cut off, or belongs to another version of \
          the file; copy all files again whose names begin with the name of the first one"
     )]
     WrongShard {
