@@ -361,7 +361,7 @@ impl Loader {
                 let request = self.requests.swap_remove(at);
                 // Its body, if any, says nothing.
                 self.cancelled.push(id);
-                if self.awaits_header() && request.asked.start > 0 {
+                if request.asked.start > 0 && (self.awaits_header() || self.awaits_length()) {
                     // Then it is known where this is.
                     let error = StreamError::WrongRange("nothing, before its beginning has come".to_owned());
                     self.stumble(request, error, now_ms, 0);
@@ -576,10 +576,18 @@ impl Loader {
         self.needed.first_in(&rest).is_some_and(|next| next.start == rest.start)
     }
 
-    /// Sees that the file is in shards, if it shows now: then there is more of it to be needed.
+    /// Whether the length of the first object is being found out.
+    fn awaits_length(&self) -> bool {
+        let is_asked = self.requests.iter().any(|request| request.measures);
+        is_asked || self.measures == Measures::Due || self.pauses.iter().any(|pause| pause.measures)
+    }
+
+    /// Sees that the file is in shards, if it shows now: then there is more of it to be needed, and what was not in the first one need not wait.
     fn look_for_shards(&mut self) {
         if self.file.find_shards() {
             self.find_needed();
+            let file = &self.file;
+            self.pauses.retain(|pause| pause.measures || file.object_at(pause.range.start) == 0);
         }
     }
 
