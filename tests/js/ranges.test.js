@@ -357,7 +357,9 @@ test("a file in shards comes as one, whatever the server tells of them", async (
       const { got, ranges } = await fetchAll(WANTED, { open: true }, `${base}?${++round}`);
       const what = `${size} ${JSON.stringify(server)}`;
       for (const [start, end, bytes] of got) assert.deepEqual(bytes, headed.slice(start, end), `${what}: ${start} to ${end}`);
-      assert.equal(ranges.total, SIZE, what);
+      // Of one object whose length is not told nothing but its end is known.
+      const isHidden = size === SIZE && server.told === false;
+      assert.equal(ranges.total, isHidden ? undefined : SIZE, what);
       ranges.close();
       // The shards that are needed, and one request at most to learn that there are some, and how long they are.
       const paths = new Set(asked.map(({ path }) => path));
