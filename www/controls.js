@@ -188,7 +188,8 @@ export function attachControls(canvas, viewer, { onHome, onBox, onClick, onHover
     const { spans, point: from } = began;
     const stayed = isNear(event, began.place);
     if (spans) onSpan(undefined, undefined, stayed ? undefined : [from, point(event)]);
-    else if (stayed && (handle === null || handle < 0)) onClick(point(event));
+    // Also on a handle: that there is one may not be known yet, and a click must not depend on it.
+    else if (stayed) onClick(point(event));
     began = undefined;
   }
 

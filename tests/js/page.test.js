@@ -213,7 +213,8 @@ test("nor has it with several views, probes, a region, messages, the map of bloc
     await settle(page);
     for (const [i, x] of [0.45, 0.58].entries()) {
       const { x: left, y: top, width, height } = await page.locator("#canvas").boundingBox();
-      await page.mouse.click(left + x * width, top + 0.5 * height);
+      // On a handle of the region a press that lasts until this is known is a click, too.
+      await page.mouse.click(left + x * width, top + 0.5 * height, { delay: 500 });
       await page.locator(".card").nth(i).waitFor({ timeout: PATIENCE });
     }
     await page.locator("#plot path").waitFor({ timeout: PATIENCE });
