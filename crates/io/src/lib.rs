@@ -74,6 +74,7 @@ mod ranges;
 mod raw;
 mod reading;
 mod scanner;
+mod shared_points;
 mod shares;
 mod skeleton;
 mod steps_in_memory;

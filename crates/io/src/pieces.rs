@@ -3,23 +3,21 @@
 //! Those in [several files](super::pvtu) are read twice: at first for their points alone, to know which places several pieces have. Those in one
 //! file come by [ranges](super::ranges).
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::beside::{FilesOf, place};
 use crate::error::{At, ReadError, ReadReason, Stop, in_file};
-use crate::fields::settle_unused;
 use crate::file_kind::without_mark;
 #[cfg(feature = "hdf5")]
 use crate::formats::vtkhdf_ranges::HdfFile;
 use crate::listed::{for_each_file, names};
-use crate::numbering::Numbering;
-use crate::pvtu::{bits, numbered};
-use crate::vtu::{NumberPoints, PieceReader, in_order};
+use crate::ranges::InPieces;
+use crate::shared_points::{SharedPoints, hash};
+use crate::vtu::PieceReader;
 use crate::vtu_ranges::VtuFile;
 use crate::xml::Document;
 use crate::{CellData, PieceCounts, ReadOptions, packed};
-use tetralod::mesh::{Field, MeshPiece, Middles, TetMesh};
+use tetralod::mesh::{MeshPiece, TetMesh};
 
 /// A mesh of which a piece is read at a time.
 #[derive(Debug)]
@@ -34,9 +32,8 @@ pub struct Pieces {
 enum Content {
     /// In the files that this list names.
     List(Vec<u8>),
-    Vtu(VtuFile),
-    #[cfg(feature = "hdf5")]
-    Hdf(HdfFile),
+    /// In this one.
+    File(Box<dyn InPieces>),
 }
 
 impl Pieces {
@@ -94,9 +91,7 @@ impl Pieces {
     pub fn counts(&self) -> Result<PieceCounts, ReadError> {
         let list = match &self.content {
             Content::List(list) => list,
-            Content::Vtu(file) => return Ok(file.counts()),
-            #[cfg(feature = "hdf5")]
-            Content::Hdf(file) => return Ok(file.counts()),
+            Content::File(file) => return Ok(file.counts()),
         };
         let document = Document::parse(without_mark(list)).map_err(|error| self.named(error))?;
         let mut counts = PieceCounts::default();
@@ -153,11 +148,7 @@ impl Pieces {
         };
         let read = match &self.content {
             Content::List(list) => return self.read_listed(&Document::parse(without_mark(list))?, each),
-            Content::Vtu(file) => file.for_each(&self.options, each),
-            #[cfg(feature = "hdf5")]
-            Content::Hdf(file) if file.partitions() > 1 => return self.read_partitions(file, each),
-            #[cfg(feature = "hdf5")]
-            Content::Hdf(file) => file.for_each(&self.options, each),
+            Content::File(file) => file.for_each(&self.options, each),
         };
         read.map_err(|stop| match stop {
             Stop::Read(error) => error,
@@ -167,25 +158,6 @@ impl Pieces {
                 ReadError { file: String::new(), place: String::new(), reason }
             }
         })
-    }
-
-    #[cfg(feature = "hdf5")]
-    fn read_partitions(
-        &self,
-        file: &HdfFile,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), ReadError> {
-        let afresh = || ReadOptions { memory: self.options.memory.afresh(), ..self.options.clone() };
-        let mut hashes = Vec::new();
-        for number in 0..file.partitions() {
-            hashes.extend(file.points(number, &afresh())?.into_iter().map(hash));
-        }
-        let mut seen = Seen { several: repeated(hashes), ..Seen::default() };
-        for number in 0..file.partitions() {
-            let place = || format!("piece {number}, PointData");
-            each(seen.read(&mut |numbers| file.read(number, &afresh(), numbers), &place)?)?;
-        }
-        Ok(())
     }
 
     fn read_listed(
@@ -204,11 +176,11 @@ impl Pieces {
             })
         })?;
         let time = document.time().or(time);
-        let mut seen = Seen { several: repeated(hashes), ..Seen::default() };
+        let mut shared = SharedPoints::of(hashes);
         for_each_file(document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let place = || format!("piece {}, <PointData>", reader.number);
-                let mut piece = seen.read(&mut |numbers| reader.read(numbers), &place)?;
+                let mut piece = shared.read(&mut |numbers| reader.read(numbers), &place)?;
                 let MeshPiece { mesh: TetMesh { fields, cell_fields, input, .. }, .. } = &mut piece;
                 input.files.0.extend(files.last());
                 fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
@@ -236,106 +208,9 @@ impl Content {
     fn of(path: &Path, options: &ReadOptions, most: Option<u64>) -> Result<Option<Self>, Stop> {
         #[cfg(feature = "hdf5")]
         if let Some(file) = HdfFile::open(path, options, most)? {
-            return Ok(Some(Self::Hdf(file)));
+            return Ok(Some(Self::File(Box::new(file))));
         }
         let file = VtuFile::open(path, options, most)?;
-        Ok(file.filter(|file| file.ranges().count() > 1).map(Self::Vtu))
-    }
-}
-
-/// A hash of a place.
-fn hash(point: [f64; 3]) -> u64 {
-    bits(point).into_iter().fold(0, |hash, word| {
-        let mixed = (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        mixed ^ (mixed >> 32)
-    })
-}
-
-/// The hashes that come several times, sorted.
-fn repeated(mut hashes: Vec<u64>) -> Vec<u64> {
-    hashes.sort_unstable();
-    hashes.chunk_by(|a, b| a == b).filter(|group| group.len() > 1).map(|group| group[0]).collect()
-}
-
-/// What is known of the pieces that were read.
-#[derive(Default)]
-struct Seen {
-    /// Hashes of all places that may be in several pieces, sorted.
-    several: Vec<u64>,
-    /// The first point at each of these places: its number, and its place in `first`.
-    known: HashMap<[u64; 3], (u32, usize)>,
-    /// The positions of these points, and their values field by field.
-    first: Vec<[f64; 3]>,
-    values: Vec<f64>,
-    points: usize,
-    /// The fields of the first piece, without values, at points and at cells.
-    fields: Option<[Vec<Field>; 2]>,
-}
-
-impl Seen {
-    /// The piece that `read` reads, given how to number its points; `place` is where its fields are.
-    fn read(
-        &mut self,
-        read: &mut dyn FnMut(NumberPoints<'_>) -> Result<TetMesh, ReadError>,
-        place: &dyn Fn() -> String,
-    ) -> Result<MeshPiece, ReadError> {
-        let (mut numbers, mut new) = (Vec::new(), Vec::new());
-        let mut mesh = read(&mut |points| {
-            // Of most points it is known without a look into the table that it does not have them.
-            let is_known = |point| self.several.binary_search(&hash(point)).is_ok();
-            let known = |point| self.known.get(&bits(point)).filter(|_| is_known(point));
-            (numbers, new) = numbered(points, self.points, |point| known(point).map(|(number, _)| *number))?;
-            Ok(Numbering::Each { numbers: numbers.clone(), next: (self.points + new.len()) as u32 })
-        })?;
-        // Those that cells got in reading.
-        for index in numbers.len()..mesh.positions.len() {
-            numbers.push((self.points + new.len()) as u32);
-            new.push(index);
-        }
-        match &self.fields {
-            None => {
-                let names =
-                    |fields: &[Field]| fields.iter().map(Field::without_values).collect::<Vec<Field>>();
-                self.fields = Some([names(&mesh.fields), names(&mesh.cell_fields)]);
-            }
-            Some([fields, cell_fields]) => {
-                mesh.fields = in_order(fields, mesh.fields).at(place)?;
-                mesh.cell_fields = in_order(cell_fields, mesh.cell_fields).at(place)?;
-            }
-        }
-        let first = self.points as u32;
-        // The points that an earlier piece has.
-        let old: Vec<usize> = (0..numbers.len()).filter(|&i| numbers[i] < first).collect();
-        let place: HashMap<u32, u32> = old.iter().map(|&i| (numbers[i], i as u32)).collect();
-        let own = |number: u32| match number.checked_sub(first) {
-            Some(rank) => new[rank as usize] as u32,
-            None => place[&number],
-        };
-        mesh.tets.iter_mut().for_each(|tet| *tet = tet.map(own));
-        let count = mesh.fields.len();
-        for i in old {
-            let (_, at) = self.known[&bits(mesh.positions[i])];
-            mesh.positions[i] = self.first[at];
-            for (f, field) in mesh.fields.iter_mut().enumerate() {
-                field.values[i] = self.values[at * count + f];
-            }
-        }
-        for &i in &new {
-            let position = mesh.positions[i];
-            let has_values = mesh.fields.iter().all(|field| field.values[i].is_finite());
-            if has_values && self.several.binary_search(&hash(position)).is_ok() {
-                let (number, at) = (numbers[i], self.first.len());
-                if let std::collections::hash_map::Entry::Vacant(entry) = self.known.entry(bits(position)) {
-                    entry.insert((number, at));
-                    self.first.push(position);
-                    self.values.extend(mesh.fields.iter().map(|field| field.values[i]));
-                }
-            }
-        }
-        self.points += new.len();
-        settle_unused(&mut mesh);
-        // A piece alone cannot know which of its points others move.
-        mesh.input.middles = Middles::default();
-        Ok(MeshPiece { points: numbers, mesh })
+        Ok(file.filter(|file| file.ranges().count() > 1).map(|file| Self::File(Box::new(file))))
     }
 }

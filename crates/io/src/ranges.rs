@@ -4,6 +4,7 @@
 //! At first come all points, some at a time, in their order; then ranges of cells with the points that they use, which are read again.
 
 use std::collections::BTreeMap;
+use std::fmt::Debug;
 use std::ops::Range;
 
 use crate::cell_shapes::middles;
@@ -12,7 +13,7 @@ use crate::cells::{self, CellList, Indices, Split};
 use crate::error::{ReadError, ReadReason, Stop};
 use crate::numbering::Numbering;
 use crate::vtu::{first_number, in_order};
-use crate::{MemoryLimit, ReadOptions};
+use crate::{MemoryLimit, PieceCounts, ReadOptions};
 use tetralod::mesh::{Field, MeshPiece, TetMesh};
 
 /// Cells whose types are looked at together, and points that come together.
@@ -22,6 +23,17 @@ const POINTS: u64 = 1 << 18;
 const NEAR: u64 = 1 << 15;
 /// Tetrahedra of a range, at least.
 const LEAST_TETS: u64 = 1 << 20;
+
+/// A file whose mesh comes in pieces.
+pub(super) trait InPieces: Debug {
+    fn counts(&self) -> PieceCounts;
+    /// Passes on all pieces.
+    fn for_each(
+        &self,
+        options: &ReadOptions,
+        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
+    ) -> Result<(), Stop>;
+}
 
 /// A grid of which parts are read.
 pub(super) trait Grid {

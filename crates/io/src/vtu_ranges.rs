@@ -11,7 +11,7 @@ use crate::fields::Collector;
 use crate::file_kind::without_mark;
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE};
 use crate::number::points_from;
-use crate::ranges::{Before, Grid, Ranges, Rows};
+use crate::ranges::{Before, Grid, InPieces, Ranges, Rows};
 use crate::skeleton::{Skeleton, left_in_file};
 use crate::stored::{Bytes, Stored};
 use crate::vtu::{PieceReader, readers};
@@ -69,36 +69,6 @@ impl VtuFile {
     /// All ranges.
     pub fn ranges(&self) -> impl Iterator<Item = &Range<u64>> {
         self.pieces.iter().flat_map(|piece| &piece.ranges)
-    }
-
-    pub fn counts(&self) -> PieceCounts {
-        PieceCounts {
-            points: self.points,
-            tetrahedra: self.pieces.iter().map(|piece| piece.tets).sum(),
-            pieces: self.ranges().count() as u64,
-            largest: self.pieces.iter().map(|piece| piece.largest).max().unwrap_or(0),
-            fields: self.fields,
-        }
-    }
-
-    /// Passes on the mesh piece by piece.
-    pub fn for_each(
-        &self,
-        options: &ReadOptions,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), Stop> {
-        let document = self.document()?;
-        let time = self.time(&document);
-        let mut before = Before::default();
-        for (reader, ranges) in readers(&document, options).zip(&self.pieces) {
-            let grid = self.grid(&reader)?;
-            before.for_each(&grid, &ranges.ranges, options, &mut |mut piece| {
-                let TetMesh { fields, cell_fields, .. } = &mut piece.mesh;
-                fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
-                each(piece)
-            })?;
-        }
-        Ok(())
     }
 
     fn document(&self) -> Result<Document<'_>, ReadError> {
@@ -174,6 +144,37 @@ impl VtuFile {
             positions: open(reader.points_array()?, points.saturating_mul(3))?,
             ends,
         })
+    }
+}
+
+impl InPieces for VtuFile {
+    fn counts(&self) -> PieceCounts {
+        PieceCounts {
+            points: self.points,
+            tetrahedra: self.pieces.iter().map(|piece| piece.tets).sum(),
+            pieces: self.ranges().count() as u64,
+            largest: self.pieces.iter().map(|piece| piece.largest).max().unwrap_or(0),
+            fields: self.fields,
+        }
+    }
+
+    fn for_each(
+        &self,
+        options: &ReadOptions,
+        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
+    ) -> Result<(), Stop> {
+        let document = self.document()?;
+        let time = self.time(&document);
+        let mut before = Before::default();
+        for (reader, ranges) in readers(&document, options).zip(&self.pieces) {
+            let grid = self.grid(&reader)?;
+            before.for_each(&grid, &ranges.ranges, options, &mut |mut piece| {
+                let TetMesh { fields, cell_fields, .. } = &mut piece.mesh;
+                fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
+                each(piece)
+            })?;
+        }
+        Ok(())
     }
 }
 

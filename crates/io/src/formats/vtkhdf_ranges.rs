@@ -12,8 +12,8 @@ use crate::formats::hdf5_values::{floats, integers, row_length};
 use crate::formats::vtkhdf::{Piece, ROOT, Reader, UNSTRUCTURED};
 use crate::ghosts::GHOST_TYPE;
 use crate::number::points_from;
-use crate::ranges::{Before, Grid, Ranges, Rows};
-use crate::vtu::NumberPoints;
+use crate::ranges::{Before, Grid, InPieces, Ranges, Rows};
+use crate::shared_points::{SharedPoints, hash};
 use crate::{PieceCounts, ReadOptions};
 use tetralod::mesh::{MeshInput, MeshPiece, TetMesh};
 
@@ -66,49 +66,56 @@ impl HdfFile {
         Ok((ranges.len() > 1).then_some(Self { file, pieces, ranges, counts }))
     }
 
-    pub fn counts(&self) -> PieceCounts {
+    /// Passes on the partitions of a file with several, each of which has points of its own.
+    fn partitions(
+        &self,
+        options: &ReadOptions,
+        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
+    ) -> Result<(), ReadError> {
+        let afresh = || ReadOptions { memory: options.memory.afresh(), ..options.clone() };
+        let mut hashes = Vec::new();
+        for (number, piece) in self.pieces.iter().enumerate() {
+            let options = &afresh();
+            let (reader, ..) = Reader::of(&self.file, options)?;
+            let points = reader.positions(piece).at(|| format!("piece {number}, {ROOT}/Points"))?;
+            hashes.extend(points.into_iter().map(hash));
+        }
+        let mut shared = SharedPoints::of(hashes);
+        for (number, piece) in self.pieces.iter().enumerate() {
+            let options = &afresh();
+            let (reader, _, time) = Reader::of(&self.file, options)?;
+            let place = || format!("piece {number}, PointData");
+            let mut piece = shared.read(&mut |numbers| reader.piece(piece, number, numbers), &place)?;
+            set_time(&mut piece.mesh, time);
+            each(piece)?;
+        }
+        Ok(())
+    }
+}
+
+impl InPieces for HdfFile {
+    fn counts(&self) -> PieceCounts {
         self.counts
     }
 
-    /// How many pieces are read by themselves, each of which has points of its own; those of a file with one come by [`Self::for_each`].
-    pub fn partitions(&self) -> usize {
-        if self.pieces.len() > 1 { self.pieces.len() } else { 0 }
-    }
-
-    /// The points of a partition.
-    pub fn points(&self, number: usize, options: &ReadOptions) -> Result<Vec<[f64; 3]>, ReadError> {
-        let (reader, ..) = Reader::of(&self.file, options)?;
-        reader.positions(&self.pieces[number]).at(|| format!("piece {number}, {ROOT}/Points"))
-    }
-
-    /// A partition, whose points are numbered as `numbers` says.
-    pub fn read(
-        &self,
-        number: usize,
-        options: &ReadOptions,
-        numbers: NumberPoints<'_>,
-    ) -> Result<TetMesh, ReadError> {
-        let (reader, _, time) = Reader::of(&self.file, options)?;
-        let mut mesh = reader.piece(&self.pieces[number], number, numbers)?;
-        mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
-        Ok(mesh)
-    }
-
-    /// Passes on the only partition by ranges.
-    pub fn for_each(
+    fn for_each(
         &self,
         options: &ReadOptions,
         each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
     ) -> Result<(), Stop> {
+        let [piece] = &self.pieces[..] else { return Ok(self.partitions(options, each)?) };
         let (reader, _, time) = Reader::of(&self.file, options)?;
-        let [piece] = &self.pieces[..] else { return Ok(()) };
         let grid = HdfGrid { reader: &reader, piece, number: 0 };
         Before::default().for_each(&grid, &self.ranges, options, &mut |mut piece| {
-            let TetMesh { fields, cell_fields, .. } = &mut piece.mesh;
-            fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
+            set_time(&mut piece.mesh, time);
             each(piece)
         })
     }
+}
+
+/// All fields are of this time.
+fn set_time(mesh: &mut TetMesh, time: Option<f64>) {
+    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
 }
 
 /// A piece of a file.

@@ -1,0 +1,112 @@
+//! Pieces that have points of their own: those at one place are one point, which all of these pieces have.
+
+use std::collections::HashMap;
+
+use crate::error::{At, ReadError};
+use crate::fields::settle_unused;
+use crate::numbering::Numbering;
+use crate::pvtu::{bits, numbered};
+use crate::vtu::{NumberPoints, in_order};
+use tetralod::mesh::{Field, MeshPiece, Middles, TetMesh};
+
+/// A hash of a place.
+pub(super) fn hash(point: [f64; 3]) -> u64 {
+    bits(point).into_iter().fold(0, |hash, word| {
+        let mixed = (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        mixed ^ (mixed >> 32)
+    })
+}
+
+/// The hashes that come several times, sorted.
+fn repeated(mut hashes: Vec<u64>) -> Vec<u64> {
+    hashes.sort_unstable();
+    hashes.chunk_by(|a, b| a == b).filter(|group| group.len() > 1).map(|group| group[0]).collect()
+}
+
+/// The points that several pieces have, as far as these were read.
+#[derive(Default)]
+pub(super) struct SharedPoints {
+    /// Hashes of all places that may be in several pieces, sorted.
+    several: Vec<u64>,
+    /// The first point at each of these places: its number, and its place in `first`.
+    known: HashMap<[u64; 3], (u32, usize)>,
+    /// The positions of these points, and their values field by field.
+    first: Vec<[f64; 3]>,
+    values: Vec<f64>,
+    points: usize,
+    /// The fields of the first piece, without values, at points and at cells.
+    fields: Option<[Vec<Field>; 2]>,
+}
+
+impl SharedPoints {
+    /// Of pieces with points at the places that have these hashes.
+    pub fn of(hashes: Vec<u64>) -> Self {
+        Self { several: repeated(hashes), ..Self::default() }
+    }
+
+    /// The piece that `read` reads, given how to number its points; `place` is where its fields are.
+    pub fn read(
+        &mut self,
+        read: &mut dyn FnMut(NumberPoints<'_>) -> Result<TetMesh, ReadError>,
+        place: &dyn Fn() -> String,
+    ) -> Result<MeshPiece, ReadError> {
+        let (mut numbers, mut new) = (Vec::new(), Vec::new());
+        let mut mesh = read(&mut |points| {
+            // Of most points it is known without a look into the table that it does not have them.
+            let is_known = |point| self.several.binary_search(&hash(point)).is_ok();
+            let known = |point| self.known.get(&bits(point)).filter(|_| is_known(point));
+            (numbers, new) = numbered(points, self.points, |point| known(point).map(|(number, _)| *number))?;
+            Ok(Numbering::Each { numbers: numbers.clone(), next: (self.points + new.len()) as u32 })
+        })?;
+        // Those that cells got in reading.
+        for index in numbers.len()..mesh.positions.len() {
+            numbers.push((self.points + new.len()) as u32);
+            new.push(index);
+        }
+        match &self.fields {
+            None => {
+                let names =
+                    |fields: &[Field]| fields.iter().map(Field::without_values).collect::<Vec<Field>>();
+                self.fields = Some([names(&mesh.fields), names(&mesh.cell_fields)]);
+            }
+            Some([fields, cell_fields]) => {
+                mesh.fields = in_order(fields, mesh.fields).at(place)?;
+                mesh.cell_fields = in_order(cell_fields, mesh.cell_fields).at(place)?;
+            }
+        }
+        let first = self.points as u32;
+        // The points that an earlier piece has.
+        let old: Vec<usize> = (0..numbers.len()).filter(|&i| numbers[i] < first).collect();
+        let place: HashMap<u32, u32> = old.iter().map(|&i| (numbers[i], i as u32)).collect();
+        let own = |number: u32| match number.checked_sub(first) {
+            Some(rank) => new[rank as usize] as u32,
+            None => place[&number],
+        };
+        mesh.tets.iter_mut().for_each(|tet| *tet = tet.map(own));
+        let count = mesh.fields.len();
+        for i in old {
+            let (_, at) = self.known[&bits(mesh.positions[i])];
+            mesh.positions[i] = self.first[at];
+            for (f, field) in mesh.fields.iter_mut().enumerate() {
+                field.values[i] = self.values[at * count + f];
+            }
+        }
+        for &i in &new {
+            let position = mesh.positions[i];
+            let has_values = mesh.fields.iter().all(|field| field.values[i].is_finite());
+            if has_values && self.several.binary_search(&hash(position)).is_ok() {
+                let (number, at) = (numbers[i], self.first.len());
+                if let std::collections::hash_map::Entry::Vacant(entry) = self.known.entry(bits(position)) {
+                    entry.insert((number, at));
+                    self.first.push(position);
+                    self.values.extend(mesh.fields.iter().map(|field| field.values[i]));
+                }
+            }
+        }
+        self.points += new.len();
+        settle_unused(&mut mesh);
+        // A piece alone cannot know which of its points others move.
+        mesh.input.middles = Middles::default();
+        Ok(MeshPiece { points: numbers, mesh })
+    }
+}
