@@ -332,21 +332,23 @@ pub(super) fn joined<'f>(
         let number = piece.put(points, positions, values, shortest);
         number.iter().zip(&fragment.ends).for_each(|(&v, own)| ends[v as usize] = *own);
         let of = |v: u32| number[v as usize];
-        piece.moved.extend(fragment.moved.iter().map(|&(v, place)| (of(v), place)));
+        let carried = &mut piece.carried;
+        carried.moved.extend(fragment.moved.iter().map(|&(v, place)| (of(v), place)));
         piece.tets.extend(fragment.tets.iter().map(|tet| tet.map(of)));
-        piece.inside.extend(fragment.inside.iter().map(|&(v, t)| (of(v), t)));
-        piece.outside.extend(fragment.outside.iter().map(|&v| of(v)));
+        carried.inside.extend(fragment.inside.iter().map(|&(v, t)| (of(v), t)));
+        carried.outside.extend(fragment.outside.iter().map(|&v| of(v)));
     }
-    piece.moved.sort_unstable_by_key(|(v, _)| *v);
-    piece.moved.dedup_by_key(|(v, _)| *v);
-    piece.inside.sort_unstable();
-    piece.outside.sort_unstable();
+    let carried = &mut piece.carried;
+    carried.moved.sort_unstable_by_key(|(v, _)| *v);
+    carried.moved.dedup_by_key(|(v, _)| *v);
+    carried.inside.sort_unstable();
+    carried.outside.sort_unstable();
     let is_elsewhere = |[first, last]: [u16; 2]| first != last || u32::from(first) != part;
     let shared = (0..).zip(&ends).filter(|(_, ends)| is_elsewhere(**ends));
-    piece.shared = shared.map(|(v, [first, last])| (v, u32::from(*first), u32::from(*last))).collect();
+    carried.shared = shared.map(|(v, [first, last])| (v, u32::from(*first), u32::from(*last))).collect();
     let from = interface.partition_point(|(other, ..)| u32::from(*other) < part);
     let faces = interface[from..].iter().take_while(|(other, ..)| u32::from(*other) == part);
     let number = |v: u32| piece.points.partition_point(|&other| other < v) as u32;
-    piece.interface = faces.map(|&(_, face, other)| (face.map(number), u32::from(other))).collect();
+    carried.interface = faces.map(|&(_, face, other)| (face.map(number), u32::from(other))).collect();
     piece
 }

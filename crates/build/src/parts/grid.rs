@@ -4,7 +4,7 @@
 
 use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
-use super::piece::{Part, Piece};
+use super::piece::{Carried, Part, Piece};
 use super::plan::Plan;
 use crate::error::points::as_vec;
 use crate::lattice::field_lattice;
@@ -267,19 +267,20 @@ impl<'a> GridCut<'a> {
             let [first, last] = self.parts_at(p);
             (first != last).then_some((i, first, last))
         });
-        Piece {
-            positions: here.iter().map(|&p| self.position(p)).collect(),
-            values: here.iter().flat_map(values).collect(),
+        let kept = (0..).zip(&here).filter(|(_, p)| self.kept.binary_search(&of_whole(**p)).is_ok());
+        let carried = Carried {
             shortest: here.iter().map(|&p| self.shortest(p)).collect(),
             shared: shared.collect(),
             interface: self.interface(index, cells, local),
-            kept: (0..)
-                .zip(&here)
-                .filter(|(_, p)| self.kept.binary_search(&of_whole(**p)).is_ok())
-                .map(|(i, _)| i)
-                .collect(),
+            kept: kept.map(|(i, _)| i).collect(),
+            ..Carried::default()
+        };
+        Piece {
+            positions: here.iter().map(|&p| self.position(p)).collect(),
+            values: here.iter().flat_map(values).collect(),
             points: here.iter().map(|&p| of_whole(p)).collect(),
             tets,
+            carried,
             ..Piece::default()
         }
     }

@@ -3,7 +3,7 @@
 //! A part is decimated like a whole, but for its open vertices, and until an eighth of its tetrahedra is left.
 
 use super::PartsError;
-use super::piece::{Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
+use super::piece::{Carried, Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::change::work_mesh::{ELSEWHERE, WorkMesh};
 use crate::decimate::candidate_queue::Levels;
@@ -81,13 +81,13 @@ fn run(head: Head, mut piece: Piece, progress: OnProgress<'_>) -> Result<(Part, 
     let before = piece.tets.len();
     let quantized = quantized(&plan, &info, &mut piece);
     let topology = topology(piece.points.len(), &piece.tets).map_err(BuildError::from)?;
-    let earlier: Vec<ErrorCode> = piece.earlier_errors.iter().copied().map(ErrorCode).collect();
+    let earlier: Vec<ErrorCode> = piece.carried.earlier_errors.iter().copied().map(ErrorCode).collect();
     let inner = take(&mut piece.inner);
     let inner = if inner.is_empty() { vec![0; before] } else { inner };
     let state = state(&plan, node, (&mut piece, topology), &quantized)?;
     let of_piece = MtInfo { vertices: piece.points.len() as u32, ..info };
     let mut record = Collapses::resume(&of_piece, earlier, inner);
-    let left = before.div_ceil(LEFT).max(LEFT_AT_INTERFACE * piece.interface.len());
+    let left = before.div_ceil(LEFT).max(LEFT_AT_INTERFACE * piece.carried.interface.len());
     let enough = if plan.is_whole(node) { 0 } else { left as u32 };
     let mut decimator = Decimator::new(state, None, &mut record);
     decimator.remove_until(enough, &mut |now| progress(of_step(now, before, enough)))?;
@@ -118,8 +118,8 @@ fn quantized(plan: &Plan, info: &MtInfo, piece: &mut Piece) -> Quantized {
     let positions: Arc<[[i32; 3]]> = take(&mut piece.positions).into();
     let Sided { first, further, values } = &piece.sided;
     let per_value = || piece.values.iter().chain(values).zip(fields.iter().cycle());
-    let place = |point: usize| match piece.moved.binary_search_by_key(&(point as u32), |(v, _)| *v) {
-        Ok(at) => DVec3::from_array(piece.moved[at].1),
+    let place = |point: usize| match piece.carried.moved.binary_search_by_key(&(point as u32), |(v, _)| *v) {
+        Ok(at) => DVec3::from_array(piece.carried.moved[at].1),
         Err(_) => as_vec(positions[point]),
     };
     Quantized {
@@ -149,36 +149,36 @@ fn state<'a>(
     let is_reference = node.level == 0;
     let boundary = match is_reference {
         true => boundary_faces(&piece.tets, &neighbors).map(|(_, face)| face).collect(),
-        false => take(&mut piece.boundary),
+        false => take(&mut piece.carried.boundary),
     };
     let boundary = BoundaryDistance::of(boundary, quantized);
     let of_errors = (plan.displacement_per_error, plan.displacement_edges);
-    let reference = Reference::of(quantized, boundary, take(&mut piece.shortest), of_errors);
+    let reference = Reference::of(quantized, boundary, take(&mut piece.carried.shortest), of_errors);
     let mut open = vec![false; points];
-    piece.shared.iter().for_each(|&(v, ..)| open[v as usize] = true);
+    piece.carried.shared.iter().for_each(|&(v, ..)| open[v as usize] = true);
     let frozen = non_manifold.iter().zip(&open).map(|(a, b)| a | b).collect();
     let mut buckets = Buckets::new(piece.tets.len(), quantized);
-    take(&mut piece.inside).into_iter().for_each(|(v, t)| buckets.inside.put(t, v));
-    take(&mut piece.border).into_iter().for_each(|(v, t)| buckets.border.put(t, v));
-    take(&mut piece.outside).into_iter().for_each(|v| buckets.outside_points.set_outside(v, true));
-    take(&mut piece.foreign).into_iter().for_each(|(v, t)| buckets.outside_points.add_foreign(t, v));
+    take(&mut piece.carried.inside).into_iter().for_each(|(v, t)| buckets.inside.put(t, v));
+    take(&mut piece.carried.border).into_iter().for_each(|(v, t)| buckets.border.put(t, v));
+    take(&mut piece.carried.outside).into_iter().for_each(|v| buckets.outside_points.set_outside(v, true));
+    take(&mut piece.carried.foreign).into_iter().for_each(|(v, t)| buckets.outside_points.add_foreign(t, v));
     let mut removals = Removals::new(piece.tets.len());
     if !piece.makers.is_empty() {
         removals.makers = take(&mut piece.makers);
     }
-    removals.errors = take(&mut piece.earlier_errors).into_iter().map(ErrorCode).collect();
+    removals.errors = take(&mut piece.carried.earlier_errors).into_iter().map(ErrorCode).collect();
     let mut reaches = match is_reference {
         true => reach::of_stars(&piece.tets, &quantized.positions),
         false => vec![Reach::default(); points],
     };
-    for (v, ends) in take(&mut piece.reaches) {
+    for (v, ends) in take(&mut piece.carried.reaches) {
         ends.iter().for_each(|&p| reaches[v as usize].add(p));
     }
     let mesh = WorkMesh::new(take(&mut piece.tets), neighbors, points);
     let history = History { buckets, removals, reaches };
     let state = State::resume(mesh, reference, frozen, Levels::of_purpose(plan.purpose()), history);
-    let mut kept = vec![false; if piece.kept.is_empty() { 0 } else { points }];
-    piece.kept.iter().for_each(|&v| kept[v as usize] = true);
+    let mut kept = vec![false; if piece.carried.kept.is_empty() { 0 } else { points }];
+    piece.carried.kept.iter().for_each(|&v| kept[v as usize] = true);
     let restrictions = Restrictions::of_angles(&plan.restricting(), quantized)?;
     let restrictions = restrictions.with(take(&mut piece.regions), kept);
     Ok(State { open, restrictions, ..state })
@@ -186,7 +186,7 @@ fn state<'a>(
 
 /// Enters which faces without a neighbour lead to other parts.
 fn mark_interface(piece: &Piece, neighbors: &mut [[u32; 4]]) -> Result<(), PartsError> {
-    let mut faces: Vec<[u32; 3]> = piece.interface.iter().map(|(face, _)| *face).collect();
+    let mut faces: Vec<[u32; 3]> = piece.carried.interface.iter().map(|(face, _)| *face).collect();
     faces.sort_unstable();
     let mut found = 0;
     let outer: Vec<(u32, [u32; 3])> = boundary_faces(&piece.tets, neighbors).collect();
@@ -234,17 +234,18 @@ fn what_is_left(state: &mut State<'_>, places: &Left) -> Piece {
     let left = (0..reference.points).filter(|&v| mesh.has(v));
     let regions = state.restrictions.regions();
     let live = if regions.is_empty() { &[][..] } else { &places.live };
-    Piece {
+    let carried = Carried {
         border: places.pairs(|t| buckets.border.iter(t)),
         foreign: places.pairs(|t| buckets.outside_points.foreign_to(t)),
         boundary: reference.boundary.all().to_vec(),
-        regions: live.iter().map(|&t| regions[t as usize]).collect(),
         reaches: left.map(|v| (v, reaches[v as usize].ends())).collect(),
         inside,
         outside,
         shortest,
-        ..Piece::default()
-    }
+        ..Carried::default()
+    };
+    let regions = live.iter().map(|&t| regions[t as usize]).collect();
+    Piece { regions, carried, ..Piece::default() }
 }
 
 /// Orders the updates, and makes what is left refer to them.
@@ -294,21 +295,19 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
     }
     let marks = record.marks_left();
     let number = |maker: u32| if maker == NONE { NONE } else { table[&maker] };
+    let Carried { moved, shared, interface, kept, .. } = piece.carried;
+    let carried = Carried { earlier_errors, moved, shared, interface, kept, ..left.carried };
     let piece = Piece {
         tets: record.tets_left().to_vec(),
         makers: marks.iter().map(|(maker, _)| number(*maker)).collect(),
         inner: marks.iter().map(|(_, inner)| *inner).collect(),
         earlier,
-        earlier_errors,
         points: piece.points,
         positions: piece.positions,
         values: piece.values,
-        moved: piece.moved,
-        shared: piece.shared,
-        interface: piece.interface,
-        kept: piece.kept,
         sided: piece.sided,
-        ..left
+        regions: left.regions,
+        carried,
     };
     (Part { head: head.clone(), piece }, PartUpdates { head, rows })
 }
@@ -321,7 +320,7 @@ fn joined(plan: &Plan, node: Node, mut pieces: Vec<Piece>) -> Piece {
     // What has been put is freed before the next is touched: never is all there twice.
     let put = |piece: &mut Piece| {
         let (positions, values, shortest) =
-            (take(&mut piece.positions), take(&mut piece.values), take(&mut piece.shortest));
+            (take(&mut piece.positions), take(&mut piece.values), take(&mut piece.carried.shortest));
         all.put(&piece.points, &positions, &values, &shortest)
     };
     let mut numbers: Vec<Vec<u32>> = pieces.iter_mut().map(put).collect();
@@ -330,31 +329,31 @@ fn joined(plan: &Plan, node: Node, mut pieces: Vec<Piece>) -> Piece {
         let number = |v: u32| numbers[v as usize];
         let (first_tet, first_made) = (all.tets.len() as u32, all.earlier.len() as u32);
         let in_bucket = |&(v, t): &(u32, u32)| (number(v), first_tet + t);
-        all.moved.extend(piece.moved.iter().map(|&(v, place)| (number(v), place)));
-        let shared = piece.shared.iter().filter(|shared| is_open(shared));
-        all.shared.extend(shared.map(|&(v, first, last)| (number(v), first, last)));
+        all.carried.moved.extend(piece.carried.moved.iter().map(|&(v, place)| (number(v), place)));
+        let shared = piece.carried.shared.iter().filter(|shared| is_open(shared));
+        all.carried.shared.extend(shared.map(|&(v, first, last)| (number(v), first, last)));
         all.tets.extend(piece.tets.iter().map(|tet| tet.map(number)));
-        let interface = piece.interface.iter().filter(|(_, other)| !own.contains(other));
-        all.interface.extend(interface.map(|&(face, other)| (face.map(number), other)));
+        let interface = piece.carried.interface.iter().filter(|(_, other)| !own.contains(other));
+        all.carried.interface.extend(interface.map(|&(face, other)| (face.map(number), other)));
         let made = |&maker: &u32| if maker == NONE { NONE } else { first_made + maker };
         all.makers.extend(piece.makers.iter().map(made));
         all.inner.extend_from_slice(&piece.inner);
         all.earlier.extend_from_slice(&piece.earlier);
-        all.earlier_errors.extend_from_slice(&piece.earlier_errors);
-        all.inside.extend(piece.inside.iter().map(in_bucket));
-        all.border.extend(piece.border.iter().map(in_bucket));
-        all.foreign.extend(piece.foreign.iter().map(in_bucket));
-        all.outside.extend(piece.outside.iter().map(|&v| number(v)));
-        all.boundary.extend(piece.boundary.iter().map(|face| face.map(number)));
+        all.carried.earlier_errors.extend_from_slice(&piece.carried.earlier_errors);
+        all.carried.inside.extend(piece.carried.inside.iter().map(in_bucket));
+        all.carried.border.extend(piece.carried.border.iter().map(in_bucket));
+        all.carried.foreign.extend(piece.carried.foreign.iter().map(in_bucket));
+        all.carried.outside.extend(piece.carried.outside.iter().map(|&v| number(v)));
+        all.carried.boundary.extend(piece.carried.boundary.iter().map(|face| face.map(number)));
         all.regions.extend_from_slice(&piece.regions);
-        all.kept.extend(piece.kept.iter().map(|&v| number(v)));
-        all.reaches.extend(piece.reaches.iter().map(|&(v, ends)| (number(v), ends)));
+        all.carried.kept.extend(piece.carried.kept.iter().map(|&v| number(v)));
+        all.carried.reaches.extend(piece.carried.reaches.iter().map(|&(v, ends)| (number(v), ends)));
     }
-    all.kept.sort_unstable();
-    all.kept.dedup();
-    all.moved.sort_unstable_by_key(|(v, _)| *v);
-    all.moved.dedup_by_key(|(v, _)| *v);
-    all.shared.sort_unstable();
-    all.shared.dedup();
+    all.carried.kept.sort_unstable();
+    all.carried.kept.dedup();
+    all.carried.moved.sort_unstable_by_key(|(v, _)| *v);
+    all.carried.moved.dedup_by_key(|(v, _)| *v);
+    all.carried.shared.sort_unstable();
+    all.carried.shared.dedup();
     all
 }

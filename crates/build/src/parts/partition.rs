@@ -80,15 +80,15 @@ pub fn part(
     };
     cut.each(|v| v, &mut |part, fragment| {
         let index = u32::from(part);
-        let piece = joined(index, chosen.len(), std::iter::once(&fragment), &interface);
+        let mut piece = joined(index, chosen.len(), std::iter::once(&fragment), &interface);
         let regions = part_of.iter().zip(restrictions.regions()).filter(|(of, _)| **of == part);
         let regions = regions.map(|(_, &region)| region).collect();
         let kept = (0..).zip(&piece.points).filter(|(_, v)| restrictions.keeps(**v));
-        let kept = kept.map(|(i, _)| i).collect();
+        piece.carried.kept = kept.map(|(i, _)| i).collect();
         let of_sides = Sided::of(&piece.points, &quantized.sides, |point| {
             chosen.iter().map(move |field| sides::value(mesh, field, point as usize))
         });
-        put(Part::of(&plan, index, Piece { regions, kept, sided: of_sides, ..piece }))
+        put(Part::of(&plan, index, Piece { regions, sided: of_sides, ..piece }))
     })?;
     Ok(plan)
 }

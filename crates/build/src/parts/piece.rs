@@ -51,21 +51,34 @@ pub(super) struct Piece {
     pub positions: Vec<[i32; 3]>,
     /// Point by point and field by field.
     pub values: Vec<f64>,
+    pub tets: Vec<[u32; 4]>,
+    /// For each tetrahedron what made it, as a place in `earlier`; [`NONE`] for those of the reference mesh. Empty if all are.
+    pub makers: Vec<u32>,
+    /// Which of its faces were inside then: see `Collapses::inner`.
+    pub inner: Vec<u8>,
+    /// The updates that are the inverses of what made tetrahedra.
+    pub earlier: Vec<Made>,
+    /// The region of each tetrahedron, if regions are kept apart; else empty.
+    pub regions: Vec<u32>,
+    /// Where fields jump between regions.
+    pub sided: Sided,
+    /// In a frame of its own.
+    #[serde(skip)]
+    pub carried: Carried,
+}
+
+/// What a piece needs to be simplified further, and assembling does not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Carried {
     /// For each point the square of the shortest edge of the reference mesh there; see `Quantized::shortest_edges`.
     pub shortest: Vec<f64>,
     /// Points that the lattice has moved, and where they were, in its steps.
     pub moved: Vec<(u32, [f64; 3])>,
     /// Points that belong to other parts, too, and the first and the last part that has them.
     pub shared: Vec<(u32, u32, u32)>,
-    pub tets: Vec<[u32; 4]>,
     /// Faces to other parts, their corners ascending, and the part behind each.
     pub interface: Vec<([u32; 3], u32)>,
-    /// For each tetrahedron what made it, as a place in `earlier`; [`NONE`] for those of the reference mesh. Empty if all are.
-    pub makers: Vec<u32>,
-    /// Which of its faces were inside then: see `Collapses::inner`.
-    pub inner: Vec<u8>,
-    /// The updates that are the inverses of what made tetrahedra, and their errors, field by field.
-    pub earlier: Vec<Made>,
+    /// The errors of [`Piece::earlier`], field by field.
     pub earlier_errors: Vec<u16>,
     /// Points that are in buckets, and of which tetrahedron: see `error::cost`.
     pub inside: Vec<(u32, u32)>,
@@ -75,10 +88,6 @@ pub(super) struct Piece {
     pub outside: Vec<u32>,
     /// The boundary of the reference mesh, once the part has been built.
     pub boundary: Vec<[u32; 3]>,
-    /// The region of each tetrahedron, if regions are kept apart; else empty.
-    pub regions: Vec<u32>,
-    /// Where fields jump between regions.
-    pub sided: Sided,
     /// Points that stay where they are, ascending.
     pub kept: Vec<u32>,
     /// How far the removal of each vertex reaches, once the part has been built: see `order::reach`.
@@ -95,6 +104,9 @@ pub(super) struct Sided {
     /// Side by side and field by field.
     pub values: Vec<f64>,
 }
+
+/// What is wrong where points have no values.
+const LACKS_VALUES: &str = "its points lack values";
 
 /// Updates in their order, and what removes the tetrahedra of their stars.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -196,7 +208,8 @@ impl Piece {
         let count = points.len();
         let (positions, values, shortest) =
             (vec![[0; 3]; count], vec![0.0; count * fields], vec![0.0; count]);
-        Self { points, positions, values, shortest, ..Self::default() }
+        let carried = Carried { shortest, ..Carried::default() };
+        Self { points, positions, values, carried, ..Self::default() }
     }
 
     /// Puts points of a piece where they are here; returns where.
@@ -215,7 +228,7 @@ impl Piece {
             at += self.points[at..].partition_point(|&other| other < point);
             numbers.push(at as u32);
             self.positions[at] = positions[i];
-            self.shortest[at] = shortest[i];
+            self.carried.shortest[at] = shortest[i];
             self.values[at * fields..][..fields].copy_from_slice(&values[i * fields..][..fields]);
         }
         numbers
@@ -274,7 +287,7 @@ impl Part {
     pub fn write(&self, out: &mut dyn Write) -> Result<(), PartsError> {
         write_magic(out)?;
         write_frame(out, &self.head)?;
-        write_frame(out, &self.piece)
+        self.write_piece(out)
     }
 
     /// Writes a part that has been built, with its updates.
@@ -285,7 +298,12 @@ impl Part {
         write_magic(out)?;
         write_frame(out, &self.head)?;
         write_frame(out, &updates.rows)?;
-        write_frame(out, &self.piece)
+        self.write_piece(out)
+    }
+
+    fn write_piece(&self, out: &mut dyn Write) -> Result<(), PartsError> {
+        write_frame(out, &self.piece)?;
+        write_frame(out, &self.piece.carried)
     }
 
     /// Reads a part, built or not.
@@ -293,6 +311,17 @@ impl Part {
     /// # Errors
     /// If `input` fails, or holds no whole and sound part.
     pub fn read<R: Read + Seek>(input: &mut R) -> Result<Self, PartsError> {
+        let mut part = Self::read_mesh(input)?;
+        part.piece.carried = read_numbers(input)?;
+        part.check_carried().map_err(|what| PartsError::Damaged { what })?;
+        Ok(part)
+    }
+
+    /// Reads what assembling needs of a part, and no more of it: it cannot be joined.
+    ///
+    /// # Errors
+    /// As [`Part::read`], but for what is not read.
+    pub fn read_mesh<R: Read + Seek>(input: &mut R) -> Result<Self, PartsError> {
         read_magic(input)?;
         let head: Head = read_frame(input)?;
         if head.built {
@@ -316,6 +345,7 @@ impl Part {
         }
         skip_frame(input)?;
         skip_frame(input)?;
+        skip_frame(input)?;
         let end = input.stream_position()?;
         if input.seek(SeekFrom::End(0))? == end {
             Ok((plan, node))
@@ -324,7 +354,7 @@ impl Part {
         }
     }
 
-    /// Checks what building relies on.
+    /// Checks what building and assembling rely on.
     fn check(&self) -> Result<(), &'static str> {
         let Self { head: Head { plan, node, .. }, piece } = self;
         let (points, fields) = (piece.points.len(), plan.fields.len());
@@ -335,8 +365,8 @@ impl Part {
         let side = 1_i32.checked_shl(plan.lattice.2).filter(|_| plan.lattice.2 <= 30).unwrap_or(0);
         let is_on = |p: &[i32; 3]| p.iter().all(|x| (0..=side).contains(x));
         let are_finite = piece.values.iter().all(|x| x.is_finite());
-        let lengths = [piece.positions.len(), piece.shortest.len(), piece.values.len() / fields];
-        expect(lengths == [points; 3] && piece.values.len() == points * fields, "its points lack values")?;
+        let lengths = [piece.positions.len(), piece.values.len() / fields];
+        expect(lengths == [points; 2] && piece.values.len() == points * fields, LACKS_VALUES)?;
         expect(are_finite && piece.positions.iter().all(is_on), "its points are off the lattice")?;
         let at = |v: u32| piece.positions.get(v as usize);
         let is_positive = |&[a, b, c, d]: &[u32; 4]| {
@@ -363,21 +393,29 @@ impl Part {
         let marks = [piece.makers.len(), piece.inner.len()];
         expect(marks == [0; 2] || marks == [tets; 2], "its tetrahedra lack marks")?;
         expect(piece.makers.iter().all(made), "its tetrahedra have other marks")?;
-        expect(piece.earlier_errors.len() == earlier * fields, "its updates lack errors")?;
-        expect(piece.earlier.iter().all(|made| plan.has(made.node)), "its updates are others")?;
+        expect(piece.earlier.iter().all(|made| plan.has(made.node)), "its updates are others")
+    }
+
+    /// Checks what building relies on besides.
+    fn check_carried(&self) -> Result<(), &'static str> {
+        let Self { head: Head { plan, .. }, piece: Piece { points, tets, earlier, sided, carried, .. } } =
+            self;
+        let points = points.len();
+        expect(carried.shortest.len() == points, LACKS_VALUES)?;
+        expect(carried.earlier_errors.len() == earlier.len() * plan.fields.len(), "its updates lack errors")?;
         let is_point = |v: &u32| (*v as usize) < points;
-        let is_any = |v: &u32| (*v as usize) < points + further.len();
-        let in_bucket = |(v, t): &(u32, u32)| is_any(v) && (*t as usize) < tets;
-        let buckets = [&piece.inside, &piece.border, &piece.foreign];
+        let is_any = |v: &u32| (*v as usize) < points + sided.further.len();
+        let in_bucket = |(v, t): &(u32, u32)| is_any(v) && (*t as usize) < tets.len();
+        let buckets = [&carried.inside, &carried.border, &carried.foreign];
         expect(buckets.iter().all(|all| all.iter().all(in_bucket)), "its buckets are others")?;
-        let refers = piece.outside.iter().all(is_any)
-            && piece.moved.windows(2).all(|pair| pair[0].0 < pair[1].0)
-            && piece.moved.iter().all(|(v, place)| is_point(v) && place.iter().all(|x| x.is_finite()))
-            && piece.shared.iter().all(|(v, first, last)| is_point(v) && first <= last)
-            && piece.reaches.iter().all(|(v, _)| is_point(v))
-            && piece.kept.iter().all(is_point)
-            && piece.interface.iter().all(|(face, _)| face.iter().all(is_point))
-            && piece.boundary.iter().all(|face| face.iter().all(is_point));
+        let refers = carried.outside.iter().all(is_any)
+            && carried.moved.windows(2).all(|pair| pair[0].0 < pair[1].0)
+            && carried.moved.iter().all(|(v, place)| is_point(v) && place.iter().all(|x| x.is_finite()))
+            && carried.shared.iter().all(|(v, first, last)| is_point(v) && first <= last)
+            && carried.reaches.iter().all(|(v, _)| is_point(v))
+            && carried.kept.iter().all(is_point)
+            && carried.interface.iter().all(|(face, _)| face.iter().all(is_point))
+            && carried.boundary.iter().all(|face| face.iter().all(is_point));
         expect(refers, "it refers to other points")
     }
 }
@@ -498,9 +536,9 @@ mod tests {
             ("no number", &|p| p.values[0] = f64::NAN),
             ("a value too few", &|p| p.values.truncate(1)),
             ("no tetrahedra", &|p| p.tets.clear()),
-            ("a bucket of no tetrahedron", &|p| p.inside.push((0, u32::MAX))),
+            ("a bucket of no tetrahedron", &|p| p.carried.inside.push((0, u32::MAX))),
             ("a mark of no update", &|p| p.makers = vec![p.earlier.len() as u32; p.tets.len()]),
-            ("a kept point that is none", &|p| p.kept.push(beyond)),
+            ("a kept point that is none", &|p| p.carried.kept.push(beyond)),
         ];
         for (what, change) in changes {
             for part in [&first, &built] {
