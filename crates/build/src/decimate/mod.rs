@@ -145,8 +145,7 @@ fn decimate_into(
     record.start(&info, state.mesh.tets.len());
     let mut decimator = Decimator::new(state, gift_wrap, record);
     decimator.remove_all(progress)?;
-    let Decimator { mut state, record, .. } = decimator;
-    record.finish(&state.mesh.tets, &state.removals.makers);
+    let mut state = decimator.finish();
     let interface_deviation = state.restrictions.interface_deviation();
     let regions = state.restrictions.take_regions(&state.mesh.tets);
     drop(state);
@@ -202,7 +201,8 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
 
     /// Removes vertices until no more can be removed, or a round leaves at most so many tetrahedra.
     pub fn remove_until(&mut self, enough: u32, progress: OnProgress<'_>) -> Result<(), BuildError> {
-        let vertices = (0..self.state.reference.points).filter(|&v| self.state.mesh.has(v)).count();
+        let points = self.state.mesh.incident.len() as u32;
+        let vertices = (0..points).filter(|&v| self.state.mesh.has(v)).count();
         loop {
             let before = self.record.len();
             self.round(progress)?;
@@ -212,6 +212,12 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
                 return Ok(());
             }
         }
+    }
+
+    /// Ends the record, and returns what is left.
+    pub fn finish(self) -> State<'a> {
+        self.record.finish(&self.state.mesh.tets, &self.state.removals.makers);
+        self.state
     }
 
     /// Frees what belongs to tetrahedra that are gone, if they are many, and what takes too much with those that are left.

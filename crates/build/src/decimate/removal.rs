@@ -73,7 +73,7 @@ impl<'a> State<'a> {
             open: Vec::new(),
             buckets,
             removals,
-            versions: vec![0; quantized.positions.len()],
+            versions: vec![0; mesh.incident.len()],
             degrees: mesh.degrees(),
             reaches,
             ruler: Ruler::new(quantized),

@@ -26,13 +26,14 @@ pub(crate) struct BoundaryDistance {
 impl BoundaryDistance {
     /// Of the triangles without a neighbour.
     pub fn new(tets: &[[u32; 4]], neighbors: &[[u32; 4]], quantized: &Quantized) -> Self {
-        Self::of(boundary_faces(tets, neighbors).map(|(_, face)| face).collect(), quantized)
+        let faces = boundary_faces(tets, neighbors).map(|(_, face)| face).collect();
+        Self::of(faces, quantized.positions.len(), quantized)
     }
 
-    /// Of these triangles, counter-clockwise when seen from outside.
-    pub fn of(corners: Vec<[u32; 3]>, quantized: &Quantized) -> Self {
+    /// Of these triangles, counter-clockwise when seen from outside, given how many vertices may be asked for besides their corners.
+    pub fn of(corners: Vec<[u32; 3]>, vertices: usize, quantized: &Quantized) -> Self {
         let triangles: Vec<_> = corners.iter().map(|face| face.map(|v| quantized.scaled(v))).collect();
-        let points = quantized.positions.len();
+        let points = corners.iter().flatten().fold(vertices, |points, &v| points.max(v as usize + 1));
         let around = Groups::new(points, |add| {
             (0..).zip(&corners).for_each(|(t, face)| face.iter().for_each(|v| add(*v as usize, t)));
         });

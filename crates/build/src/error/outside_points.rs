@@ -13,18 +13,22 @@ use std::ops::RangeInclusive;
 
 /// The reference vertices outside of the tetrahedra in whose buckets they are.
 pub(crate) struct OutsidePoints {
-    /// Whether a vertex is outside of the tetrahedron in whose bucket it is.
-    outside: Vec<bool>,
-    /// Whether a vertex is foreign to some tetrahedron.
-    is_foreign: Vec<bool>,
+    /// What is known of each vertex: [`OUTSIDE`], [`FOREIGN`], [`KNOWN`].
+    marks: Vec<u8>,
     /// The foreign vertices of each tetrahedron.
     foreign: SparseLists,
     grid: Grid,
     /// All that have ever been outside, by cell of the grid.
     cells: SparseLists,
     occupied: Occupied,
-    known: Vec<bool>,
 }
+
+/// It is outside of the tetrahedron in whose bucket it is.
+const OUTSIDE: u8 = 1;
+/// It is foreign to some tetrahedron.
+const FOREIGN: u8 = 2;
+/// It is in a cell of the grid.
+const KNOWN: u8 = 4;
 
 /// A regular grid over all reference vertices.
 struct Grid {
@@ -51,11 +55,9 @@ impl OutsidePoints {
         let points = places.len();
         let grid = Grid::new(places);
         Self {
-            outside: vec![false; points],
-            is_foreign: vec![false; points],
+            marks: vec![0; points],
             foreign: SparseLists::default(),
             cells: SparseLists::default(),
-            known: vec![false; points],
             occupied: Occupied::new(grid.cells),
             grid,
         }
@@ -82,7 +84,7 @@ impl OutsidePoints {
         all.filter(move |&point| {
             let place = self.grid.places.at(point);
             let is_inside = place.cmpge(low).all() && place.cmple(high).all();
-            is_inside && self.outside[point as usize] && !self.is_foreign[point as usize]
+            is_inside && self.marks[point as usize] & (OUTSIDE | FOREIGN) == OUTSIDE
         })
     }
 
@@ -98,14 +100,16 @@ impl OutsidePoints {
 
     /// Removes the foreign vertices of a tetrahedron, which may be a new one.
     pub fn clear(&mut self, t: u32) {
-        self.foreign.iter(t).for_each(|point| self.is_foreign[point as usize] = false);
+        self.foreign.iter(t).for_each(|point| self.marks[point as usize] &= !FOREIGN);
         self.foreign.take(t);
     }
 
     /// Records whether a vertex is outside of the tetrahedron in whose bucket it is now.
     pub fn set_outside(&mut self, point: u32, outside: bool) {
-        self.outside[point as usize] = outside;
-        if outside && !std::mem::replace(&mut self.known[point as usize], true) {
+        let marks = &mut self.marks[point as usize];
+        let before = *marks;
+        *marks = if outside { before | OUTSIDE | KNOWN } else { before & !OUTSIDE };
+        if outside && before & KNOWN == 0 {
             let cell = self.grid.cell(self.grid.places.at(point));
             self.cells.put(self.grid.number(cell), point);
             self.occupied.add(cell);
@@ -114,12 +118,14 @@ impl OutsidePoints {
 
     /// Whether a vertex is known to be outside of the tetrahedron in whose bucket it is.
     pub fn is_outside(&self, point: u32) -> bool {
-        self.outside[point as usize]
+        self.marks[point as usize] & OUTSIDE != 0
     }
 
     /// Makes a vertex that is outside of its own tetrahedron foreign to another one, unless it already is to some.
     pub fn add_foreign(&mut self, t: u32, point: u32) {
-        if self.outside[point as usize] && !std::mem::replace(&mut self.is_foreign[point as usize], true) {
+        let marks = &mut self.marks[point as usize];
+        if *marks & (OUTSIDE | FOREIGN) == OUTSIDE {
+            *marks |= FOREIGN;
             self.foreign.put(t, point);
         }
     }

@@ -22,10 +22,12 @@ pub(crate) struct Quantized {
     pub lattice: Lattice,
     pub fields: Vec<FieldInfo>,
     pub positions: Arc<[[i32; 3]]>,
-    /// `levels[point * fields + f]`; those of sides behind those of vertices.
+    /// `levels[point * fields + f]`; those of sides behind those of vertices. Where no field jumps, points that are not in the mesh need none.
     pub levels: Vec<i32>,
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
+    /// Whether `exact` has the values as they come instead: where they are passed on, both would take twice the memory.
+    pub is_plain: bool,
     /// Where fields jump at interfaces.
     pub sides: Sides,
     /// The input's points in steps of the lattice, not rounded; the field is compared there.
@@ -56,7 +58,8 @@ impl Quantized {
         let places = places.with_sides(sides.vertices());
         let quantization = position_lattice::largest_move(mesh, &lattice, &positions);
         let positions = rounded;
-        Self { lattice, fields, positions, levels, exact, sides, places, locations: Vec::new(), quantization }
+        let (is_plain, locations) = (false, Vec::new());
+        Self { lattice, fields, positions, levels, exact, is_plain, sides, places, locations, quantization }
     }
 
     /// What is known of the MT of a mesh of so many tetrahedra; not how many updates it has. `displacement_per_error`: model units of
@@ -172,9 +175,10 @@ impl Quantized {
         let own = 1.0 - lambda.element_sum();
         let mut largest = 0.0_f64;
         let exact = &self.exact[point as usize * self.fields.len()..];
-        for (f, ((field, exact), most)) in self.fields.iter().zip(exact).zip(errors).enumerate() {
+        for (f, ((field, &exact), most)) in self.fields.iter().zip(exact).zip(errors).enumerate() {
             let [w, x, y, z] = corners(f).map(f64::from);
             let value = own * w + lambda.x * x + lambda.y * y + lambda.z * z;
+            let exact = if self.is_plain { (exact - field.origin) / field.step } else { exact };
             let error = (value - exact).abs() * field.step / field.range();
             *most = most.max(error);
             largest = largest.max(error);
@@ -252,6 +256,7 @@ pub(crate) fn lattices_alone(lattice: Lattice, fields: Vec<FieldInfo>, quantizat
         positions,
         levels: Vec::new(),
         exact: Vec::new(),
+        is_plain: false,
         sides: Sides::default(),
         locations: Vec::new(),
         quantization,

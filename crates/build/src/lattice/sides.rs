@@ -48,6 +48,11 @@ impl Sides {
         Self { jumps, first, further: further.into(), starts }
     }
 
+    /// The first region of each vertex, and the vertex and the region of each side.
+    pub fn into_parts(self) -> (Vec<u32>, Vec<(u32, u32)>) {
+        (self.first, self.further.to_vec())
+    }
+
     /// Whether no field jumps.
     pub fn is_empty(&self) -> bool {
         self.starts.is_empty()

@@ -329,7 +329,8 @@ pub(super) fn joined<'f>(
     let mut ends = vec![[0; 2]; piece.points.len()];
     for fragment in fragments {
         let Fragment { points, positions, values, shortest, .. } = fragment;
-        let number = piece.put(points, positions, values, shortest);
+        let number = piece.places(points);
+        piece.put(&number, positions, values, shortest);
         number.iter().zip(&fragment.ends).for_each(|(&v, own)| ends[v as usize] = *own);
         let of = |v: u32| number[v as usize];
         let carried = &mut piece.carried;

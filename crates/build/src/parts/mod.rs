@@ -81,6 +81,7 @@ mod cut;
 mod fragments;
 mod grid;
 mod node;
+mod numbering;
 mod partition;
 mod piece;
 mod piecewise;

@@ -3,13 +3,14 @@
 //! A part is decimated like a whole, but for its open vertices, and until an eighth of its tetrahedra is left.
 
 use super::PartsError;
-use super::piece::{Carried, Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
+use super::numbering;
+use super::piece::{Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::change::work_mesh::{ELSEWHERE, WorkMesh};
 use crate::decimate::candidate_queue::Levels;
 use crate::decimate::collapses::{Collapse, Collapses};
 use crate::decimate::removal::{History, State};
-use crate::decimate::{Decimator, Record};
+use crate::decimate::Decimator;
 use crate::error::boundary_distance::BoundaryDistance;
 use crate::error::fill_cost::Removals;
 use crate::error::points::as_vec;
@@ -44,7 +45,8 @@ pub fn build_part(part: Part, progress: OnProgress<'_>) -> Result<(Part, PartUpd
     if head.built || head.node.level > 0 {
         return Err(PartsError::Damaged { what: "it has been built already" });
     }
-    run(head, piece, progress)
+    let vertices = piece.points.len();
+    run(head, (piece, vertices), progress)
 }
 
 /// Joins what is left of the parts of a node, in their order, and simplifies what was between them: returns what is left, and the
@@ -70,36 +72,35 @@ pub fn join(
         let ends = [children.first(), children.last()].map(|child| child.map_or(0, |child| child.index));
         return Err(PartsError::Children { level: node.level, index: node.index, children: ends });
     }
-    let piece = joined(&plan, node, parts.into_iter().map(|part| part.piece).collect());
-    run(Head { plan, node, built: true }, piece, progress)
+    let numbered = numbering::joined(&plan, node, parts.into_iter().map(|part| part.piece).collect());
+    run(Head { plan, node, built: true }, numbered, progress)
 }
 
-/// Simplifies a piece.
-fn run(head: Head, mut piece: Piece, progress: OnProgress<'_>) -> Result<(Part, PartUpdates), PartsError> {
+/// Simplifies a piece, of whose points so many are vertices of the mesh: the first ones.
+fn run(
+    head: Head,
+    (mut piece, vertices): (Piece, usize),
+    progress: OnProgress<'_>,
+) -> Result<(Part, PartUpdates), PartsError> {
     let Head { plan, node, .. } = head;
-    let info = plan.info();
+    let info = MtInfo { vertices: vertices as u32, ..plan.info() };
     let before = piece.tets.len();
-    let quantized = quantized(&plan, &info, &mut piece);
-    let topology = topology(piece.points.len(), &piece.tets).map_err(BuildError::from)?;
+    let quantized = quantized(&plan, &info, vertices, &mut piece);
+    let topology = topology(vertices, &piece.tets).map_err(BuildError::from)?;
     let earlier: Vec<ErrorCode> = piece.carried.earlier_errors.iter().copied().map(ErrorCode).collect();
     let inner = take(&mut piece.inner);
     let inner = if inner.is_empty() { vec![0; before] } else { inner };
     let state = state(&plan, node, (&mut piece, topology), &quantized)?;
-    let of_piece = MtInfo { vertices: piece.points.len() as u32, ..info };
-    let mut record = Collapses::resume(&of_piece, earlier, inner);
+    let mut record = Collapses::resume(&info, earlier, inner);
     let left = before.div_ceil(LEFT).max(LEFT_AT_INTERFACE * piece.carried.interface.len());
     let enough = if plan.is_whole(node) { 0 } else { left as u32 };
     let mut decimator = Decimator::new(state, None, &mut record);
     decimator.remove_until(enough, &mut |now| progress(of_step(now, before, enough)))?;
-    let Decimator { mut state, record: finished, .. } = decimator;
-    finished.finish(&state.mesh.tets, &state.removals.makers);
-    let places = Left::of(&state.mesh.tets);
-    let left = what_is_left(&mut state, &places);
-    drop(state);
-    piece.positions = quantized.positions.to_vec();
-    drop(quantized);
+    let state = decimator.finish();
+    take_what_is_left(state, &mut piece);
+    take_points(quantized, &mut piece);
     let head = Head { plan, node, built: true };
-    Ok(sorted_out(head, (piece, left), record))
+    Ok(sorted_out(head, (piece, vertices), record))
 }
 
 /// The progress of a step by its tetrahedra, from so many to `enough`: it ends before the vertices do, and begins after others. A step
@@ -112,28 +113,49 @@ fn of_step(now: BuildProgress, before: usize, enough: u32) -> BuildProgress {
     BuildProgress { done, total, ..now }
 }
 
-/// The reference vertices of a piece, whose positions it takes, on the lattices of the whole.
-fn quantized(plan: &Plan, info: &MtInfo, piece: &mut Piece) -> Quantized {
+/// The reference vertices of a piece, of which it takes what it has of them, on the lattices of the whole.
+fn quantized(plan: &Plan, info: &MtInfo, vertices: usize, piece: &mut Piece) -> Quantized {
     let fields = &info.fields;
     let positions: Arc<[[i32; 3]]> = take(&mut piece.positions).into();
-    let Sided { first, further, values } = &piece.sided;
-    let per_value = || piece.values.iter().chain(values).zip(fields.iter().cycle());
-    let place = |point: usize| match piece.carried.moved.binary_search_by_key(&(point as u32), |(v, _)| *v) {
-        Ok(at) => DVec3::from_array(piece.carried.moved[at].1),
+    let Sided { first, further, values } = take(&mut piece.sided);
+    let moved = take(&mut piece.carried.moved);
+    let place = |point: usize| match moved.binary_search_by_key(&(point as u32), |(v, _)| *v) {
+        Ok(at) => DVec3::from_array(moved[at].1),
         Err(_) => as_vec(positions[point]),
     };
+    let places = Places::new(positions.clone(), (0..positions.len()).map(place))
+        .with_sides(further.iter().map(|(v, _)| *v));
+    let mut exact = take(&mut piece.values);
+    exact.extend(values);
+    // Those of sides are behind those of all points.
+    let with_levels = if further.is_empty() { vertices * fields.len() } else { exact.len() };
+    let levels = exact[..with_levels].iter().zip(fields.iter().cycle());
     Quantized {
         lattice: info.lattice,
         fields: fields.clone(),
-        levels: per_value().map(|(&value, field)| field.nearest(value)).collect(),
-        exact: per_value().map(|(&value, field)| (value - field.origin) / field.step).collect(),
-        places: Places::new(positions.clone(), (0..positions.len()).map(place))
-            .with_sides(further.iter().map(|(v, _)| *v)),
+        levels: levels.map(|(&value, field)| field.nearest(value)).collect(),
+        exact,
+        is_plain: true,
+        places,
         positions,
-        sides: Sides::new(plan.jumps(), first.clone(), further.clone()),
+        sides: Sides::new(plan.jumps(), first, further),
         locations: Vec::new(),
         quantization: info.quantization,
     }
+}
+
+/// Gives a piece back what [`quantized`] has taken.
+fn take_points(quantized: Quantized, piece: &mut Piece) {
+    let Quantized { places, positions, sides, exact, .. } = quantized;
+    let points = positions.len() as u32;
+    let moved = (0..points).filter(|&v| places.is_moved(v)).map(|v| (v, places.at(v).to_array()));
+    piece.carried.moved = moved.collect();
+    piece.positions = positions.to_vec();
+    let (first, further) = sides.into_parts();
+    piece.values = exact;
+    let fields = piece.values.len() / (points as usize + further.len()).max(1);
+    let values = piece.values.split_off(points as usize * fields);
+    piece.sided = Sided { first, further, values };
 }
 
 /// The state of the builder in which a piece is, of which it takes what changes.
@@ -145,17 +167,22 @@ fn state<'a>(
 ) -> Result<State<'a>, PartsError> {
     let Topology { mut neighbors, non_manifold, .. } = topology;
     mark_interface(piece, &mut neighbors)?;
-    let points = piece.points.len();
+    let vertices = non_manifold.len();
     let is_reference = node.level == 0;
     let boundary = match is_reference {
         true => boundary_faces(&piece.tets, &neighbors).map(|(_, face)| face).collect(),
         false => take(&mut piece.carried.boundary),
     };
-    let boundary = BoundaryDistance::of(boundary, quantized);
+    let boundary = BoundaryDistance::of(boundary, vertices, quantized);
     let of_errors = (plan.displacement_per_error, plan.displacement_edges);
     let reference = Reference::of(quantized, boundary, take(&mut piece.carried.shortest), of_errors);
-    let mut open = vec![false; points];
-    piece.carried.shared.iter().for_each(|&(v, ..)| open[v as usize] = true);
+    // Others may be here that are vertices only elsewhere.
+    let among_vertices = |of: &mut dyn Iterator<Item = u32>| {
+        let mut among = vec![false; vertices];
+        of.filter(|&v| (v as usize) < vertices).for_each(|v| among[v as usize] = true);
+        among
+    };
+    let open = among_vertices(&mut piece.carried.shared.iter().map(|(v, ..)| *v));
     let frozen = non_manifold.iter().zip(&open).map(|(a, b)| a | b).collect();
     let mut buckets = Buckets::new(piece.tets.len(), quantized);
     take(&mut piece.carried.inside).into_iter().for_each(|(v, t)| buckets.inside.put(t, v));
@@ -169,16 +196,17 @@ fn state<'a>(
     removals.errors = take(&mut piece.carried.earlier_errors).into_iter().map(ErrorCode).collect();
     let mut reaches = match is_reference {
         true => reach::of_stars(&piece.tets, &quantized.positions),
-        false => vec![Reach::default(); points],
+        false => vec![Reach::default(); vertices],
     };
     for (v, ends) in take(&mut piece.carried.reaches) {
-        ends.iter().for_each(|&p| reaches[v as usize].add(p));
+        let reach = reaches.get_mut(v as usize);
+        reach.into_iter().for_each(|reach| ends.iter().for_each(|&p| reach.add(p)));
     }
-    let mesh = WorkMesh::new(take(&mut piece.tets), neighbors, points);
+    let mesh = WorkMesh::new(take(&mut piece.tets), neighbors, vertices);
     let history = History { buckets, removals, reaches };
     let state = State::resume(mesh, reference, frozen, Levels::of_purpose(plan.purpose()), history);
-    let mut kept = vec![false; if piece.carried.kept.is_empty() { 0 } else { points }];
-    piece.carried.kept.iter().for_each(|&v| kept[v as usize] = true);
+    let kept = &piece.carried.kept;
+    let kept = if kept.is_empty() { Vec::new() } else { among_vertices(&mut kept.iter().copied()) };
     let restrictions = Restrictions::of_angles(&plan.restricting(), quantized)?;
     let restrictions = restrictions.with(take(&mut piece.regions), kept);
     Ok(State { open, restrictions, ..state })
@@ -206,60 +234,50 @@ fn mark_interface(piece: &Piece, neighbors: &mut [[u32; 4]]) -> Result<(), Parts
     }
 }
 
-/// The tetrahedra that are left.
-struct Left {
-    /// The numbers that they had.
-    live: Vec<u32>,
-}
-
-impl Left {
-    fn of(tets: &[[u32; 4]]) -> Self {
-        Self { live: (0..).zip(tets).filter(|(_, tet)| tet[0] != NONE).map(|(t, _)| t).collect() }
-    }
-
-    /// Pairs of a point of these lists and the new number of its tetrahedron.
-    fn pairs<I: Iterator<Item = u32>>(&self, of: impl Fn(u32) -> I) -> Vec<(u32, u32)> {
-        (0..).zip(&self.live).flat_map(|(now, &t)| of(t).map(move |point| (point, now))).collect()
-    }
-}
-
-/// What is left of a piece of what the state has taken, but for what follows from the record.
-fn what_is_left(state: &mut State<'_>, places: &Left) -> Piece {
-    let shortest = take(&mut state.reference.shortest);
-    let State { mesh, buckets, reference, reaches, .. } = &*state;
-    let inside = places.pairs(|t| buckets.inside.iter(t));
+/// Gives a piece what is left of what the state has taken, but for what follows from the record.
+fn take_what_is_left(state: State<'_>, piece: &mut Piece) {
+    let State { mesh, buckets, reference, reaches, restrictions, .. } = state;
+    let live: Vec<u32> = (0..mesh.tets.len() as u32).filter(|&t| mesh.is_live(t)).collect();
+    let regions = restrictions.regions();
+    let with_regions = if regions.is_empty() { &[][..] } else { &live };
+    piece.regions = with_regions.iter().map(|&t| regions[t as usize]).collect();
+    let left = (0..mesh.incident.len() as u32).filter(|&v| mesh.has(v));
+    let carried = &mut piece.carried;
+    carried.reaches = left.map(|v| (v, reaches[v as usize].ends())).collect();
+    drop((mesh, reaches));
+    carried.shortest = reference.shortest;
+    carried.boundary = reference.boundary.all().to_vec();
+    carried.border = pairs(&live, |t| buckets.border.iter(t));
+    carried.foreign = pairs(&live, |t| buckets.outside_points.foreign_to(t));
+    carried.inside = pairs(&live, |t| buckets.inside.iter(t));
     let is_outside = |v: &u32| buckets.outside_points.is_outside(*v);
-    let mut outside: Vec<u32> = inside.iter().map(|(v, _)| *v).filter(is_outside).collect();
-    outside.sort_unstable();
-    let left = (0..reference.points).filter(|&v| mesh.has(v));
-    let regions = state.restrictions.regions();
-    let live = if regions.is_empty() { &[][..] } else { &places.live };
-    let carried = Carried {
-        border: places.pairs(|t| buckets.border.iter(t)),
-        foreign: places.pairs(|t| buckets.outside_points.foreign_to(t)),
-        boundary: reference.boundary.all().to_vec(),
-        reaches: left.map(|v| (v, reaches[v as usize].ends())).collect(),
-        inside,
-        outside,
-        shortest,
-        ..Carried::default()
-    };
-    let regions = live.iter().map(|&t| regions[t as usize]).collect();
-    Piece { regions, carried, ..Piece::default() }
+    carried.outside = carried.inside.iter().map(|(v, _)| *v).filter(is_outside).collect();
+    carried.outside.sort_unstable();
+}
+
+/// Pairs of a point of these lists and the new number of its tetrahedron, given those that are left.
+fn pairs<I: Iterator<Item = u32>>(live: &[u32], of: impl Fn(u32) -> I) -> Vec<(u32, u32)> {
+    let mut pairs = Vec::with_capacity(live.iter().map(|&t| of(t).count()).sum());
+    (0..).zip(live).for_each(|(now, &t)| pairs.extend(of(t).map(|point| (point, now))));
+    pairs
 }
 
 /// Orders the updates, and makes what is left refer to them.
-fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) -> (Part, PartUpdates) {
+fn sorted_out(
+    head: Head,
+    (mut piece, vertices): (Piece, usize),
+    mut record: Collapses,
+) -> (Part, PartUpdates) {
     let block_bits = head.plan.block_bits;
     let domain = Some(head.plan.sides);
     let order = match head.plan.is_whole(head.node) {
         // As the base mesh is going to be numbered.
         true => {
-            let base = growth_order(&piece.positions, record.tets_left());
+            let base = growth_order(&piece.positions[..vertices], record.tets_left());
             let number = |v: u32| base.number[v as usize];
             record.order((base.vertices.len() as u32, number), block_bits, domain).0
         }
-        false => record.order((piece.points.len() as u32, |v| v), block_bits, domain).0,
+        false => record.order((vertices as u32, |v| v), block_bits, domain).0,
     };
     let mut update_of = vec![0; order.len()];
     (0..).zip(&order).for_each(|(u, &c): (u32, _)| update_of[c as usize] = u);
@@ -295,65 +313,11 @@ fn sorted_out(head: Head, (piece, left): (Piece, Piece), mut record: Collapses) 
     }
     let marks = record.marks_left();
     let number = |maker: u32| if maker == NONE { NONE } else { table[&maker] };
-    let Carried { moved, shared, interface, kept, .. } = piece.carried;
-    let carried = Carried { earlier_errors, moved, shared, interface, kept, ..left.carried };
-    let piece = Piece {
-        tets: record.tets_left().to_vec(),
-        makers: marks.iter().map(|(maker, _)| number(*maker)).collect(),
-        inner: marks.iter().map(|(_, inner)| *inner).collect(),
-        earlier,
-        points: piece.points,
-        positions: piece.positions,
-        values: piece.values,
-        sided: piece.sided,
-        regions: left.regions,
-        carried,
-    };
-    (Part { head: head.clone(), piece }, PartUpdates { head, rows })
-}
-
-/// The pieces of a node as one.
-fn joined(plan: &Plan, node: Node, mut pieces: Vec<Piece>) -> Piece {
-    let mut all = Piece::over(pieces.iter().map(|piece| &piece.points), plan.fields.len());
-    let own = plan.parts_of(node);
-    let is_open = |&(_, first, last): &(u32, u32, u32)| !own.contains(&first) || !own.contains(&last);
-    // What has been put is freed before the next is touched: never is all there twice.
-    let put = |piece: &mut Piece| {
-        let (positions, values, shortest) =
-            (take(&mut piece.positions), take(&mut piece.values), take(&mut piece.carried.shortest));
-        all.put(&piece.points, &positions, &values, &shortest)
-    };
-    let mut numbers: Vec<Vec<u32>> = pieces.iter_mut().map(put).collect();
-    all.sided = Sided::joined(&pieces, all.points.len(), plan.fields.len(), &mut numbers);
-    for (piece, numbers) in pieces.into_iter().zip(numbers) {
-        let number = |v: u32| numbers[v as usize];
-        let (first_tet, first_made) = (all.tets.len() as u32, all.earlier.len() as u32);
-        let in_bucket = |&(v, t): &(u32, u32)| (number(v), first_tet + t);
-        all.carried.moved.extend(piece.carried.moved.iter().map(|&(v, place)| (number(v), place)));
-        let shared = piece.carried.shared.iter().filter(|shared| is_open(shared));
-        all.carried.shared.extend(shared.map(|&(v, first, last)| (number(v), first, last)));
-        all.tets.extend(piece.tets.iter().map(|tet| tet.map(number)));
-        let interface = piece.carried.interface.iter().filter(|(_, other)| !own.contains(other));
-        all.carried.interface.extend(interface.map(|&(face, other)| (face.map(number), other)));
-        let made = |&maker: &u32| if maker == NONE { NONE } else { first_made + maker };
-        all.makers.extend(piece.makers.iter().map(made));
-        all.inner.extend_from_slice(&piece.inner);
-        all.earlier.extend_from_slice(&piece.earlier);
-        all.carried.earlier_errors.extend_from_slice(&piece.carried.earlier_errors);
-        all.carried.inside.extend(piece.carried.inside.iter().map(in_bucket));
-        all.carried.border.extend(piece.carried.border.iter().map(in_bucket));
-        all.carried.foreign.extend(piece.carried.foreign.iter().map(in_bucket));
-        all.carried.outside.extend(piece.carried.outside.iter().map(|&v| number(v)));
-        all.carried.boundary.extend(piece.carried.boundary.iter().map(|face| face.map(number)));
-        all.regions.extend_from_slice(&piece.regions);
-        all.carried.kept.extend(piece.carried.kept.iter().map(|&v| number(v)));
-        all.carried.reaches.extend(piece.carried.reaches.iter().map(|&(v, ends)| (number(v), ends)));
-    }
-    all.carried.kept.sort_unstable();
-    all.carried.kept.dedup();
-    all.carried.moved.sort_unstable_by_key(|(v, _)| *v);
-    all.carried.moved.dedup_by_key(|(v, _)| *v);
-    all.carried.shared.sort_unstable();
-    all.carried.shared.dedup();
-    all
+    piece.tets = record.tets_left().to_vec();
+    piece.makers = marks.iter().map(|(maker, _)| number(*maker)).collect();
+    piece.inner = marks.iter().map(|(_, inner)| *inner).collect();
+    piece.earlier = earlier;
+    piece.carried.earlier_errors = earlier_errors;
+    drop(record);
+    (Part { head: head.clone(), piece: numbering::ascending(piece) }, PartUpdates { head, rows })
 }

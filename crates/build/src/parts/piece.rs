@@ -212,26 +212,25 @@ impl Piece {
         Self { points, positions, values, carried, ..Self::default() }
     }
 
-    /// Puts points of a piece where they are here; returns where.
-    pub fn put(
-        &mut self,
-        points: &[u32],
-        positions: &[[i32; 3]],
-        values: &[f64],
-        shortest: &[f64],
-    ) -> Vec<u32> {
-        let fields = values.len() / points.len().max(1);
+    /// Where these points are here; both ascend.
+    pub fn places(&self, points: &[u32]) -> Vec<u32> {
         let mut at = 0;
-        let mut numbers = Vec::with_capacity(points.len());
-        for (i, &point) in points.iter().enumerate() {
-            // Both ascend.
+        let place = |&point: &u32| {
             at += self.points[at..].partition_point(|&other| other < point);
-            numbers.push(at as u32);
+            at as u32
+        };
+        points.iter().map(place).collect()
+    }
+
+    /// Puts what a piece has of points to where they are here.
+    pub fn put(&mut self, places: &[u32], positions: &[[i32; 3]], values: &[f64], shortest: &[f64]) {
+        let fields = values.len() / places.len().max(1);
+        for (i, &at) in places.iter().enumerate() {
+            let at = at as usize;
             self.positions[at] = positions[i];
             self.carried.shortest[at] = shortest[i];
             self.values[at * fields..][..fields].copy_from_slice(&values[i * fields..][..fields]);
         }
-        numbers
     }
 }
 

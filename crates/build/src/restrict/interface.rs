@@ -36,7 +36,7 @@ impl Interface {
     /// Of tetrahedra in these regions.
     pub fn new(tolerance: f64, tets: &[[u32; 4]], regions: &[u32], quantized: &Quantized) -> Self {
         let positions = (0..quantized.positions.len() as u32).map(|v| quantized.scaled(v)).collect();
-        let reference = BoundaryDistance::of(interfaces(tets, regions), quantized);
+        let reference = BoundaryDistance::of(interfaces(tets, regions), quantized.positions.len(), quantized);
         let step = DVec3::from_array(quantized.lattice.step);
         Self { tolerance, step, reference, positions, points: BTreeMap::new(), deviation: 0.0 }
     }

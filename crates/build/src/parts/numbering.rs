@@ -1,0 +1,153 @@
+//! How the points of a node are numbered while it is simplified.
+//!
+//! Most of them are no vertices of its mesh any more, and only in buckets. These come last, so that what only vertices need is kept for
+//! vertices alone; and before them what only the boundary of the reference mesh needs. Points of each kind ascend by their numbers in
+//! the whole, as all of them do in files.
+//!
+//! ```text
+//!     | vertices of the mesh | others on the boundary | all others     |
+//!     +----------------------+------------------------+----------------+
+//!       topology, reaches      distances                buckets
+//! ```
+
+use super::piece::{Piece, Sided};
+use super::plan::{Node, Plan};
+use std::mem::take;
+use tetralod::mesh::{BitSet, NONE};
+
+/// The pieces of a node as one, vertices of its mesh first, and how many these are.
+pub(super) fn joined(plan: &Plan, node: Node, mut pieces: Vec<Piece>) -> (Piece, usize) {
+    let mut all = Piece::over(pieces.iter().map(|piece| &piece.points), plan.fields.len());
+    let mut numbers: Vec<Vec<u32>> = pieces.iter().map(|piece| all.places(&piece.points)).collect();
+    let vertices = number_vertices_first(&mut all.points, &pieces, &mut numbers);
+    // What has been put is freed before the next is touched: never is all there twice.
+    for (piece, numbers) in pieces.iter_mut().zip(&numbers) {
+        drop(take(&mut piece.points));
+        let (positions, values) = (take(&mut piece.positions), take(&mut piece.values));
+        all.put(numbers, &positions, &values, &take(&mut piece.carried.shortest));
+    }
+    all.sided = Sided::joined(&pieces, all.points.len(), plan.fields.len(), &mut numbers);
+    let own = plan.parts_of(node);
+    let is_open = |&(_, first, last): &(u32, u32, u32)| !own.contains(&first) || !own.contains(&last);
+    all.tets.reserve_exact(pieces.iter().map(|piece| piece.tets.len()).sum());
+    all.carried.inside.reserve_exact(pieces.iter().map(|piece| piece.carried.inside.len()).sum());
+    for (piece, numbers) in pieces.into_iter().zip(numbers) {
+        let number = |v: u32| numbers[v as usize];
+        let (first_tet, first_made) = (all.tets.len() as u32, all.earlier.len() as u32);
+        let in_bucket = |&(v, t): &(u32, u32)| (number(v), first_tet + t);
+        let made = |&maker: &u32| if maker == NONE { NONE } else { first_made + maker };
+        all.tets.extend(piece.tets.iter().map(|tet| tet.map(number)));
+        all.makers.extend(piece.makers.iter().map(made));
+        all.inner.extend_from_slice(&piece.inner);
+        all.earlier.extend_from_slice(&piece.earlier);
+        all.regions.extend_from_slice(&piece.regions);
+        let (all, piece) = (&mut all.carried, piece.carried);
+        all.moved.extend(piece.moved.iter().map(|&(v, place)| (number(v), place)));
+        let shared = piece.shared.iter().filter(|shared| is_open(shared));
+        all.shared.extend(shared.map(|&(v, first, last)| (number(v), first, last)));
+        let interface = piece.interface.iter().filter(|(_, other)| !own.contains(other));
+        all.interface.extend(interface.map(|&(face, other)| (face.map(number), other)));
+        all.earlier_errors.extend_from_slice(&piece.earlier_errors);
+        all.inside.extend(piece.inside.iter().map(in_bucket));
+        all.border.extend(piece.border.iter().map(in_bucket));
+        all.foreign.extend(piece.foreign.iter().map(in_bucket));
+        all.outside.extend(piece.outside.iter().map(|&v| number(v)));
+        all.boundary.extend(piece.boundary.iter().map(|face| face.map(number)));
+        all.kept.extend(piece.kept.iter().map(|&v| number(v)));
+        all.reaches.extend(piece.reaches.iter().map(|&(v, ends)| (number(v), ends)));
+    }
+    let carried = &mut all.carried;
+    carried.kept.sort_unstable();
+    carried.kept.dedup();
+    carried.moved.sort_unstable_by_key(|(v, _)| *v);
+    carried.moved.dedup_by_key(|(v, _)| *v);
+    carried.shared.sort_unstable();
+    carried.shared.dedup();
+    (all, vertices)
+}
+
+/// Numbers points anew, given where those of each piece are, and says how many are vertices.
+fn number_vertices_first(points: &mut Vec<u32>, pieces: &[Piece], numbers: &mut [Vec<u32>]) -> usize {
+    let (mut vertices, mut border) = (BitSet::default(), BitSet::default());
+    for (piece, numbers) in pieces.iter().zip(&*numbers) {
+        piece.tets.iter().flatten().for_each(|&v| _ = vertices.insert(numbers[v as usize]));
+        piece.carried.boundary.iter().flatten().for_each(|&v| _ = border.insert(numbers[v as usize]));
+    }
+    let kind = |at: u32| if vertices.has(at) { 0 } else { 2 - usize::from(border.has(at)) };
+    let all = 0..points.len() as u32;
+    let mut counts = [0; 3];
+    all.clone().for_each(|at| counts[kind(at)] += 1);
+    let mut next = [0, counts[0], counts[0] + counts[1]];
+    let place = |at: u32| {
+        let next = &mut next[kind(at)];
+        *next += 1;
+        *next - 1
+    };
+    let new: Vec<u32> = all.map(place).collect();
+    let mut numbered = vec![0; points.len()];
+    new.iter().zip(&*points).for_each(|(&v, &point)| numbered[v as usize] = point);
+    *points = numbered;
+    numbers.iter_mut().flatten().for_each(|v| *v = new[*v as usize]);
+    counts[0] as usize
+}
+
+/// The piece with its points in the order of files.
+pub(super) fn ascending(mut piece: Piece) -> Piece {
+    if piece.points.is_sorted() {
+        return piece;
+    }
+    let points = piece.points.len();
+    let mut order: Vec<u32> = (0..points as u32).collect();
+    order.sort_by_key(|&v| piece.points[v as usize]);
+    let mut number = vec![0; points + piece.sided.further.len()];
+    (0..).zip(&order).for_each(|(i, &v)| number[v as usize] = i);
+    sort_by(&order, 1, &mut piece.points);
+    sort_by(&order, 1, &mut piece.positions);
+    sort_by(&order, piece.values.len() / points, &mut piece.values);
+    sort_by(&order, 1, &mut piece.carried.shortest);
+    sort_by(&order, 1, &mut piece.sided.first);
+    drop(order);
+    sort_sides(&mut piece.sided, &mut number);
+    let new = |v: &mut u32| *v = number[*v as usize];
+    piece.tets.iter_mut().flatten().for_each(new);
+    let carried = &mut piece.carried;
+    let buckets = [&mut carried.inside, &mut carried.border, &mut carried.foreign];
+    buckets.into_iter().flatten().for_each(|(v, _)| new(v));
+    carried.outside.iter_mut().for_each(new);
+    carried.outside.sort_unstable();
+    carried.moved.iter_mut().for_each(|(v, _)| new(v));
+    carried.moved.sort_unstable_by_key(|(v, _)| *v);
+    carried.shared.iter_mut().for_each(|(v, ..)| new(v));
+    carried.shared.sort_unstable();
+    carried.interface.iter_mut().flat_map(|(face, _)| face).for_each(new);
+    carried.boundary.iter_mut().flatten().for_each(new);
+    carried.kept.iter_mut().for_each(new);
+    carried.kept.sort_unstable();
+    carried.reaches.iter_mut().for_each(|(v, _)| new(v));
+    piece
+}
+
+/// Puts what each point has so many of into another order; nothing where points have none.
+fn sort_by<T: Copy>(order: &[u32], each: usize, all: &mut Vec<T>) {
+    if !all.is_empty() {
+        let mut sorted = Vec::with_capacity(all.len());
+        order.iter().for_each(|&v| sorted.extend_from_slice(&all[v as usize * each..][..each]));
+        *all = sorted;
+    }
+}
+
+/// Sorts sides by the new numbers of their points, behind which it adds theirs.
+fn sort_sides(sided: &mut Sided, number: &mut [u32]) {
+    if sided.further.is_empty() {
+        return;
+    }
+    let points = number.len() - sided.further.len();
+    let new = |(i, &(v, region)): (u32, &(u32, u32))| (number[v as usize], region, i);
+    let mut order: Vec<(u32, u32, u32)> = (0..).zip(&sided.further).map(new).collect();
+    order.sort_unstable();
+    (points as u32..).zip(&order).for_each(|(at, &(.., i))| number[points + i as usize] = at);
+    let each = sided.values.len() / sided.further.len();
+    sided.further = order.iter().map(|&(v, region, _)| (v, region)).collect();
+    let order: Vec<u32> = order.into_iter().map(|(.., i)| i).collect();
+    sort_by(&order, each, &mut sided.values);
+}
