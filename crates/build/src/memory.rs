@@ -60,7 +60,7 @@ fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: 
     let joining = |planes: f64| {
         let at_interfaces = (4.0 * planes * side * side) as u64;
         let left = at_interfaces.saturating_mul(LEFT_AT_INTERFACE as u64).max(tetrahedra / 8).min(tetrahedra);
-        left.saturating_mul(45).saturating_add(of_points(120 + 40 * fields))
+        left.saturating_mul(45).saturating_add(of_points(100 + 24 * fields))
     };
     let last = joining(6.0);
     let assembling = of_points(250 + 30 * fields);

@@ -14,6 +14,7 @@ use crate::order::base::{Numbered, number_base};
 use crate::order::block_order;
 use crate::{BuildError, BuildProgress, BuildSummary, OnProgress};
 use std::cmp::Reverse;
+use std::mem;
 use tetralod::geom::Groups;
 use tetralod::mesh::NONE;
 use tetralod::mt::{ErrorCode, HalfEdgeMt, MtInfo, Regions, VertexId};
@@ -244,8 +245,6 @@ impl Collapses {
         let numbered = number_base(&quantized.positions, &quantized.levels, self.fields, &self.base);
         let base = numbered.mesh.positions.len() as u32;
         let (order, depth) = self.order((base, |v| numbered.number[v as usize]), block_bits, None);
-        // For the order alone.
-        (self.boxes, self.also_near) = (Vec::new(), Vec::new());
         let summary = BuildSummary::of(&info, &numbered.mesh, depth);
         let (mt, vertices) =
             self.append_all((info, regions), numbered, &order, (quantized, block_bits), progress)?;
@@ -253,7 +252,8 @@ impl Collapses {
     }
 
     /// The collapses in the order of their updates, and the length of the longest chain of updates that depend on each other. `number`
-    /// gives the numbers, below `base`, of those vertices that are left; `domain` the sides of the whole if this is a part of it.
+    /// gives the numbers, below `base`, of those vertices that are left; `domain` the sides of the whole if this is a part of it. What only
+    /// the order needs is freed: it is asked for once.
     pub fn order(
         &mut self,
         (base, number): (u32, impl Fn(u32) -> u32),
@@ -273,7 +273,7 @@ impl Collapses {
             None | Some(&NONE) => number(v),
             Some(&remover) => base + places[remover as usize],
         };
-        for &(c, v) in &self.also_near {
+        for (c, v) in mem::take(&mut self.also_near) {
             let near = &mut self.near[c as usize];
             if label(v) > label(*near) {
                 *near = v;
@@ -281,6 +281,7 @@ impl Collapses {
         }
         let near: Vec<u32> = falling.iter().map(|&c| label(self.near[c as usize])).collect();
         let boxes: Vec<[[i32; 3]; 2]> = falling.iter().map(|&c| self.boxes[c as usize]).collect();
+        self.boxes = Vec::new();
         let largest = |&c: &u32| self.errors_of(c).iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         let errors: Vec<ErrorCode> = falling.iter().map(largest).collect();
         let mut depths: Vec<u32> = Vec::with_capacity(count);
