@@ -9,6 +9,7 @@ use self::options::BuildOptions;
 use self::report::{Report, rows};
 use self::way::{Asked, Way, kept_fields, way};
 use super::output::Verbosity;
+use super::parts::{Output, Written};
 use super::progress::with_progress;
 use super::remedies::failed;
 use super::restrictions::Angles;
@@ -87,31 +88,35 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let repair = options.repair_of(&mesh, &repaired, way, verbosity)?;
     let notes = mesh.notes.clone();
     let mut angles = config.min_dihedral.map(|_| Angles::of_reference(&mesh));
-    let result = match way {
-        Way::Whole => build(arguments, &config, mesh)?,
+    let metadata = options.metadata(&config);
+    let to = Output { path: output, sharding: arguments.sharding, metadata: &metadata };
+    let written = match way {
+        Way::Whole => {
+            let BuildResult { mt, summary, exact, .. } = build(arguments, &config, mesh)?;
+            let write = |path: &Path| files::write_mt(path, &mt, exact, metadata.clone());
+            let bytes = to.sharding.write(to.path, write)?;
+            Written { mt, summary, bytes }
+        }
         Way::Parts(count) => {
-            let (whole, metadata) = (parts::Whole::Mesh(Box::new(mesh)), options.metadata(&config));
-            let built = parts::build(whole, &config, (count, metadata), output, verbosity);
+            let built = parts::build(parts::Whole::Mesh(Box::new(mesh)), &config, count, &to, verbosity);
             built.with_context(|| options.name())??
         }
     };
-    angles.iter_mut().for_each(|angles| angles.add_base(&result.mt));
+    angles.iter_mut().for_each(|angles| angles.add_base(&written.mt));
     let known = Report { repaired: repaired.to_string(), repair, angles, notes, ..Report::default() };
-    finish(arguments, &config, (result, start), known)
+    finish(arguments, &config, (written, start), known)
 }
 
-/// Writes the MT, and says what there is; `known` has what is known of the repair and the angles.
+/// Says what there is; `known` has what is known of the repair and the angles.
 fn finish(
     arguments: &Arguments,
     config: &BuildConfig,
-    (result, start): (BuildResult, Instant),
+    (written, start): (Written, Instant),
     known: Report,
 ) -> Result<()> {
-    let Arguments { options, verbosity, output, .. } = arguments;
+    let Arguments { verbosity, output, .. } = arguments;
     let Some(output) = output else { return Err(anyhow!("-o FILE is missing")) };
-    let BuildResult { mt, summary, exact, .. } = result;
-    let write = |path: &Path| files::write_mt(path, &mt, exact, options.metadata(config));
-    let file_bytes = arguments.sharding.write(output, write)?;
+    let Written { mt, summary, bytes: file_bytes } = written;
     let report = Report {
         kind: config.construction.kind().name(),
         method: config.construction.method().name(),
@@ -132,7 +137,7 @@ fn finish(
 }
 
 /// Builds a mesh in several files in parts, without reading it as a whole; none if it is another one, or is not to be built in parts.
-fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> Result<Option<BuildResult>> {
+fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> Result<Option<Written>> {
     let Arguments { options, verbosity, .. } = arguments;
     let is_whole = arguments.parts == Some(1) || arguments.parts.is_none() && arguments.memory.is_none();
     // Angles are told of the whole.
@@ -149,8 +154,9 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
             }
         };
         let Way::Parts(count) = way else { return Ok(None) };
-        let (whole, metadata) = (parts::Whole::Pieces(input), options.metadata(config));
-        let built = parts::build(whole, config, (count, metadata), output, verbosity);
+        let metadata = options.metadata(config);
+        let to = Output { path: output, sharding: arguments.sharding, metadata: &metadata };
+        let built = parts::build(parts::Whole::Pieces(input), config, count, &to, verbosity);
         match built.with_context(|| options.name())? {
             Ok(built) => Ok(Some(built)),
             Err(why) => {

@@ -169,8 +169,12 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
 
 /// Writes an MT with all that its file may keep of it; returns how many bytes that has.
 pub fn write_mt(path: &Path, mt: &Mt, exact: Vec<Exact>, metadata: BTreeMap<String, String>) -> Result<u64> {
-    let options = EncodeOptions { check_margins: true, exact, histograms: true, metadata };
-    write_file(path, |out| Ok(encode_to(mt, &options, out)?))
+    write_file(path, |out| Ok(encode_to(mt, &options(exact, metadata), out)?))
+}
+
+/// How MT files are written.
+pub fn options(exact: Vec<Exact>, metadata: BTreeMap<String, String>) -> EncodeOptions {
+    EncodeOptions { check_margins: true, exact, histograms: true, metadata }
 }
 
 /// Works in a folder beside the place of an output; it is gone afterwards, also if the work fails.
@@ -269,12 +273,6 @@ impl Drop for Transient {
         // It may be gone already.
         let _ = fs::remove_file(&self.path);
     }
-}
-
-/// Writes a file of a folder that is not kept. After an interruption, which removes the folder, none appears any more.
-pub fn write_scratch(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let _uninterrupted = partial();
-    fs::write(path, bytes)
 }
 
 /// What can be gone back in.

@@ -1,6 +1,7 @@
 //! `tetralod join`: parts that are built to one MT file.
 
 use super::output::{self, Verbosity};
+use super::parts::Written;
 use super::shards::Sharding;
 use super::{build, extremes, files, parts};
 use anyhow::{Context, Result};
@@ -8,8 +9,8 @@ use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tetralod::mt::{AveragedField, MultiTessellation};
+use tetralod_build::BuildSummary;
 use tetralod_build::parts::Node;
-use tetralod_build::{BuildResult, BuildSummary};
 
 /// Joins parts that `tetralod build --part` has built: with --node eight of one level to one of the next, with -o all that has been
 /// built to one MT file.
@@ -63,9 +64,7 @@ pub fn finish(folder: &Path, output: &Path, sharding: Sharding, verbosity: &Verb
     let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let parts: Vec<PathBuf> = entries.filter(|path| files::ending(path) == "part").collect();
     files::check_output(output, &parts)?;
-    let (BuildResult { mt, summary, exact, .. }, plan) = parts::assemble(folder, verbosity)?;
-    let write = |path: &Path| files::write_mt(path, &mt, exact, plan.metadata().clone());
-    let file_bytes = sharding.write(output, write)?;
+    let Written { mt, summary, bytes: file_bytes } = parts::assemble(folder, output, sharding, verbosity)?;
     let shards = sharding.count(file_bytes);
     let mut rows = vec![("file", output.display().to_string())];
     rows.extend(build::report::rows_of(&summary));

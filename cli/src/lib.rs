@@ -33,6 +33,7 @@ mod remedies;
 mod render;
 mod repair;
 mod restrictions;
+mod scratch;
 mod serve;
 mod shards;
 mod slice;

@@ -4,6 +4,8 @@ use super::files;
 use super::output::{self, Verbosity};
 use super::progress::{progress_bar, with_progress};
 use super::remedies::failed;
+use super::scratch::{BlockFiles, ScratchFolder};
+use super::shards::Sharding;
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -13,9 +15,11 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
+use tetralod::format::BlockEncoder;
 use tetralod::mesh::TetMesh;
-use tetralod_build::parts::{self, Node, Part, PartUpdates, PartsError, Piecewise, Plan, Scratch};
-use tetralod_build::{BuildConfig, BuildProgress, BuildResult, OnProgress};
+use tetralod::mt::Mt;
+use tetralod_build::parts::{self, Assembled, Node, Part, PartUpdates, PartsError, Piecewise, Plan};
+use tetralod_build::{BuildConfig, BuildProgress, BuildResult, BuildSummary, OnProgress};
 use tetralod_io::Pieces;
 
 /// Parses `I/N`: a part and how many there are.
@@ -97,9 +101,9 @@ impl Folder<'_> {
     ) -> Result<Result<Plan, PartsError>> {
         // Beside the parts, and gone afterwards.
         files::in_folder_beside(&self.0.join("pieces"), |folder| {
-            let mut scratch = ScratchFolder(folder);
-            let mut part = || -> Result<Plan> {
-                let mut parting = Piecewise::new(config, count, &mut scratch)?;
+            let scratch = ScratchFolder(folder);
+            let part = || -> Result<Plan> {
+                let mut parting = Piecewise::new(config, count, &scratch)?;
                 input.pieces.for_each::<anyhow::Error>(&mut |mut piece| {
                     (input.prepare)(&mut piece.mesh)?;
                     Ok(parting.add(piece)?)
@@ -226,8 +230,8 @@ impl Folder<'_> {
         })
     }
 
-    /// Makes the MT of all that has been built.
-    fn assemble(&self, plan: &Plan, verbosity: &Verbosity) -> Result<BuildResult> {
+    /// Writes the MT file of all that has been built.
+    fn assemble(&self, plan: &Plan, to: &Output<'_>, verbosity: &Verbosity) -> Result<Written> {
         let updates = |node: Node| {
             let path = self.built(node);
             let file = File::open(&path).map_err(PartsError::Io);
@@ -237,10 +241,43 @@ impl Folder<'_> {
                 )
             })
         };
-        let left =
-            |node: Node| self.read(&self.built(node), &command_for(node, plan)).map_err(PartsError::other);
-        let built = with_progress(verbosity, |progress| parts::assemble(plan, &left, &updates, progress))?;
-        built.map_err(said)
+        let left = |node: Node| {
+            let path = self.built(node);
+            let part = match plan.keeps_exact_values() {
+                true => Part::read::<BufReader<File>>,
+                false => Part::read_mesh,
+            };
+            read(&path, &command_for(node, plan), part).map_err(PartsError::other)
+        };
+        if plan.keeps_exact_values() {
+            // They are compared with the whole MT.
+            let made = |progress: OnProgress<'_>| parts::assemble(plan, &left, &updates, progress);
+            let BuildResult { mt, summary, exact, .. } = with_progress(verbosity, made)?.map_err(said)?;
+            let write = |path: &Path| files::write_mt(path, &mt, exact, to.metadata.clone());
+            let bytes = to.sharding.write(to.path, write)?;
+            return Ok(Written { mt, summary, bytes });
+        }
+        files::in_folder_beside(to.path, |folder| {
+            let mut shelf = BlockFiles::new(folder);
+            let mut encoder = BlockEncoder::new(&mut shelf);
+            let take = &mut |builder: &mut _| encoder.take_blocks(builder).map_err(PartsError::other);
+            let scratch = ScratchFolder(folder);
+            let made = with_progress(verbosity, |progress| {
+                parts::assemble_blocks(plan, (&left, &updates), &scratch, take, progress)
+            });
+            let Assembled { builder, summary, .. } = made?.map_err(said)?;
+            let mut mt = None;
+            let bytes = to.sharding.write(to.path, |path| {
+                files::write_file(path, |out| {
+                    let (written, bytes) =
+                        encoder.finish(builder, &files::options(Vec::new(), to.metadata.clone()), out)?;
+                    mt = Some(written.into());
+                    Ok(bytes)
+                })
+            })?;
+            let mt = mt.context("nothing was written")?;
+            Ok(Written { mt, summary, bytes })
+        })
     }
 
     fn read(&self, path: &Path, made_by: &str) -> Result<Part> {
@@ -340,11 +377,11 @@ pub fn join_node(folder: &Path, node: Node, verbosity: &Verbosity) -> Result<()>
     with_progress(verbosity, |progress| folder.join(node, &plan, progress))??.print(verbosity)
 }
 
-/// The MT of a folder in which all parts are built and joined, and its plan.
-pub fn assemble(folder: &Path, verbosity: &Verbosity) -> Result<(BuildResult, Plan)> {
+/// Writes the MT file of a folder in which all parts are built and joined.
+pub fn assemble(folder: &Path, path: &Path, sharding: Sharding, verbosity: &Verbosity) -> Result<Written> {
     let folder = Folder(folder);
     let plan = folder.plan(Node { level: 0, index: 0 })?;
-    Ok((folder.assemble(&plan, verbosity)?, plan))
+    folder.assemble(&plan, &Output { path, sharding, metadata: plan.metadata() }, verbosity)
 }
 
 /// A mesh in several files, and what is to be done to each piece.
@@ -353,21 +390,18 @@ pub struct InPieces<'a> {
     pub prepare: &'a dyn Fn(&mut TetMesh) -> Result<()>,
 }
 
-/// A folder for what is not kept in memory.
-struct ScratchFolder<'a>(&'a Path);
+/// The MT file to write, and what it is to say of itself.
+pub struct Output<'a> {
+    pub path: &'a Path,
+    pub sharding: Sharding,
+    pub metadata: &'a BTreeMap<String, String>,
+}
 
-impl Scratch for ScratchFolder<'_> {
-    fn write(&mut self, name: &str, bytes: &[u8]) -> std::io::Result<()> {
-        files::write_scratch(&self.0.join(name), bytes)
-    }
-
-    fn read(&self, name: &str) -> std::io::Result<Vec<u8>> {
-        std::fs::read(self.0.join(name))
-    }
-
-    fn remove(&mut self, name: &str) -> std::io::Result<()> {
-        std::fs::remove_file(self.0.join(name))
-    }
+/// An MT file that has been written: its MT, which need not have its updates, and its bytes.
+pub struct Written {
+    pub mt: Mt,
+    pub summary: BuildSummary,
+    pub bytes: u64,
 }
 
 /// What a part, or a join, counts as in the progress of its level.
@@ -380,21 +414,22 @@ pub enum Whole<'a> {
 }
 
 /// Builds a mesh in so many parts by one process, as many at a time as there are threads, in a folder beside the output that is gone
-/// afterwards.
+/// afterwards, and writes its MT file.
 ///
 /// None, with the reason, if pieces of it cannot be parted one by one.
 pub fn build(
     whole: Whole<'_>,
     config: &BuildConfig,
-    (count, metadata): (u32, BTreeMap<String, String>),
-    output: &Path,
+    count: u32,
+    output: &Output<'_>,
     verbosity: &Verbosity,
-) -> Result<Result<BuildResult, PartsError>> {
-    files::in_folder_beside(output, |path| {
+) -> Result<Result<Written, PartsError>> {
+    let metadata = || output.metadata.clone();
+    files::in_folder_beside(output.path, |path| {
         let folder = Folder(path);
         let plan = match whole {
-            Whole::Mesh(mesh) => folder.part(&mesh, config, count, metadata)?,
-            Whole::Pieces(input) => match folder.part_pieces(&input, config, count, metadata)? {
+            Whole::Mesh(mesh) => folder.part(&mesh, config, count, metadata())?,
+            Whole::Pieces(input) => match folder.part_pieces(&input, config, count, metadata())? {
                 Ok(plan) => plan,
                 Err(why) => return Ok(Err(why)),
             },
@@ -402,6 +437,6 @@ pub fn build(
         for (level, nodes) in (0..).zip(plan.levels()) {
             folder.make_level(&plan, level, nodes, verbosity)?;
         }
-        folder.assemble(&plan, verbosity).map(Ok)
+        folder.assemble(&plan, output, verbosity).map(Ok)
     })
 }

@@ -30,10 +30,7 @@ impl BlockScan {
 
 /// What a run would find that was made before.
 fn by_facts(mt: &impl Codec, facts: &MtFacts, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
-    let excess = if options.check_margins { facts.excess } else { facts.larger };
-    if let Some(excess) = excess {
-        return Err(out_of_order(excess));
-    }
+    check_order(facts, options)?;
     Ok(BlockScan {
         blocks: blocks(mt, facts.reaches.clone()),
         reference: Vec::new(),
@@ -41,14 +38,26 @@ fn by_facts(mt: &impl Codec, facts: &MtFacts, options: &EncodeOptions) -> Result
     })
 }
 
+/// Checks that errors fall along the partial order.
+pub fn check_order(facts: &MtFacts, options: &EncodeOptions) -> Result<(), EncodeError> {
+    let excess = if options.check_margins { facts.excess } else { facts.larger };
+    excess.map_or(Ok(()), |excess| Err(out_of_order(excess)))
+}
+
+/// What the index says of a page, given what it reaches, and its largest errors.
+pub fn block_info(Extent { bounds, ranges, regions }: Extent, errors: Vec<ErrorCode>) -> BlockInfo {
+    BlockInfo { lengths: Vec::new(), bounds, errors, ranges, regions }
+}
+
+/// The largest errors of the updates of a page, field by field.
+pub fn largest_errors(mt: &impl ApplyUpdates, page: u32) -> Vec<ErrorCode> {
+    let largest = |f: usize| mt.page_updates(page).map(|u| mt.error_of_field(UpdateId(u), f)).max();
+    (0..mt.info().fields.len()).map(|f| largest(f).unwrap_or(ErrorCode::ZERO)).collect()
+}
+
 /// What the index says of each page, given what it reaches.
 fn blocks(mt: &impl ApplyUpdates, reaches: Vec<Extent>) -> Vec<BlockInfo> {
-    let block = |(page, Extent { bounds, ranges, regions }): (u32, Extent)| {
-        let largest = |f: usize| mt.page_updates(page).map(|u| mt.error_of_field(UpdateId(u), f)).max();
-        let errors = (0..ranges.len()).map(|f| largest(f).unwrap_or(ErrorCode::ZERO)).collect();
-        BlockInfo { lengths: Vec::new(), bounds, errors, ranges, regions }
-    };
-    (0..).zip(reaches).map(block).collect()
+    (0..).zip(reaches).map(|(page, extent)| block_info(extent, largest_errors(mt, page))).collect()
 }
 
 fn out_of_order(Excess { update, parent, field, .. }: Excess) -> EncodeError {
@@ -60,11 +69,10 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
     mesh.make_room(mt.info());
     mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
-    let mut reaches = Reaches::default();
+    let mut reaches = Reaches::new(mt.info(), mt.page_bits());
     for u in (0..mt.updates()).map(UpdateId) {
         scan(mt, &mut mesh, u, options, (&mut margins, &mut reaches))?;
     }
-    let reaches = reaches.of_pages(mt.page_bits(), mt.info().fields.len());
     mesh.compact();
     let histograms = options.histograms.then(|| Histograms::of(&level_volumes(mt.info(), &mesh)));
     // For exact values alone.
@@ -72,7 +80,7 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
     let mut reference: Vec<(u32, Vec<i32>)> =
         slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
     reference.sort_unstable();
-    Ok(BlockScan { blocks: blocks(mt, reaches), reference, histograms })
+    Ok(BlockScan { blocks: blocks(mt, reaches.finish()), reference, histograms })
 }
 
 /// Looks at the next update, and applies it.
@@ -96,10 +104,10 @@ fn scan(
     apply_next(mt, mesh, u).map_err(EncodeError::Update)?;
     let inserted = mt.find_inserted(mesh, u).map_err(EncodeError::Update)?;
     widen(&mut own, mesh, &inserted);
-    reaches.push(own.bounds, &own.ranges, &parents);
+    reaches.push(u, own.bounds, &own.ranges, &parents);
     if mt.regions().is_some() {
         // What it inserts is in the same ones.
-        reaches.push_regions(regions);
+        reaches.push_regions(u, regions);
     }
     Ok(())
 }

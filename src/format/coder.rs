@@ -303,6 +303,17 @@ impl Models {
         )
     }
 
+    /// Tables in which all symbols of each context are as frequent.
+    pub fn even(families: impl Iterator<Item = Family>) -> Self {
+        let mut tables = Vec::new();
+        for family in families {
+            let [first, contexts] = [family.first, family.contexts].map(|n| n as usize);
+            tables.resize(tables.len().max(first + contexts), Table::default());
+            tables[first..first + contexts].fill(Table::new(&vec![1; family.symbols as usize]));
+        }
+        Self(tables)
+    }
+
     /// Appends the tables: for each context how many symbols it has, then each symbol as the distance from the one before, and
     /// its share but for the last one.
     pub fn write(&self, out: &mut Vec<u8>) {

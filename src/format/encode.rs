@@ -5,14 +5,14 @@
 //! (`block_scan`), or, of a half-edge MT that has just been made, from what its builder has noted (`mt::facts`): files are the same either way.
 
 use super::block_scan::BlockScan;
-use super::coder::{Measure, Models, Put, Writer};
+use super::coder::{Counts, Measure, Models, Put, Writer};
 use super::header::{END_BYTES, HEADER_BYTES, Kind, Start, header};
 use super::payload::Totals;
 use super::payload::codec::Codec;
 use super::payload::exact::Corrections;
 use super::payload::histogram::Histograms;
-use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
-use super::section::Section;
+use super::payload::index::{BlockInfo, Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
+use super::section::{PutBytes, Section};
 use super::{EncodeError, EncodeOptions, checksum, payload};
 use crate::mt::{Exact, Mt, Regions, VertexId};
 use std::collections::BTreeMap;
@@ -46,80 +46,109 @@ fn encode_kind<C: Codec>(
     options: &EncodeOptions,
     writer: &mut dyn io::Write,
 ) -> Result<u64, EncodeError> {
+    if mt.present() != mt.info().updates {
+        let (updates, expected) = (mt.present(), mt.info().updates);
+        return Err(EncodeError::Incomplete { updates, expected });
+    }
     check(mt)?;
     let scan = BlockScan::of(mt, options)?;
     let exact = corrections(mt, &options.exact, &scan.reference)?;
-    let sections = sections(mt, &options.metadata, scan, &exact)?;
-    let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
-    let mut totals = Totals { updates: mt.updates(), sections: sections.len() as u32, crc: 0 };
-    let mut chain = checksum::Hasher::new();
-    for section in &sections {
-        total += section.len();
-        chain.update(&section.head.crc.to_le_bytes());
+    let mut counts = mt.count_updates()?;
+    exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
+    let models = models(counts, mt);
+    let of_blocks = mt.sections(&models)?;
+    let lengths = |sections: &Vec<Section>| sections.iter().map(|section| section.len() as u32).collect();
+    let mut blocks = scan.blocks;
+    blocks.iter_mut().zip(&of_blocks).for_each(|(block, sections)| block.lengths = lengths(sections));
+    let mut file = File::begin(mt, &models, (&options.metadata, scan.histograms.as_ref()), blocks)?;
+    file.has_exact = !mt.info().kind.is_paged() && !exact.is_empty();
+    file.of_blocks = of_blocks.iter().flatten().map(|section| (section.len(), section.head.crc)).collect();
+    for (field, corrections) in &exact {
+        let head = [*field, u32::from(!corrections.is_single()), corrections.count()];
+        file.behind.push(Section::coded(Kind::EXACT, &head, &models, |out| corrections.put(out))?);
     }
-    totals.crc = chain.finalize();
-    let end = Section::written(Kind::ENDF, |out| payload::write_end(out, totals))?;
-    let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
-    let has_index = mt.info().kind.is_paged();
-    put(&header(Start {
-        total: Some(total),
-        tet_errors: mt.has_tet_errors(),
-        sides: mt.regions().is_some_and(Regions::has_sides),
-        exact: !has_index && !exact.is_empty(),
-    }))?;
-    for section in sections.iter().chain([&end]) {
-        put(&section.head.to_bytes())?;
-        put(&section.payload)?;
+    file.write(mt, writer, &mut |put| of_blocks.iter().flatten().try_for_each(|section| section.put(put)))
+}
+
+/// All that a file has, but for its blocks themselves.
+pub struct File {
+    front: Vec<Section>,
+    /// The bytes and the checksum of each section of the blocks.
+    pub of_blocks: Vec<(u64, u32)>,
+    behind: Vec<Section>,
+    has_exact: bool,
+}
+
+impl File {
+    /// With what stands in front of the blocks, of which an index is made if the MT is to have one.
+    pub fn begin<C: Codec>(
+        mt: &C,
+        models: &Models,
+        (metadata, histograms): (&BTreeMap<String, String>, Option<&Histograms>),
+        blocks: Vec<BlockInfo>,
+    ) -> Result<Self, EncodeError> {
+        let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks };
+        let shared = shared_sections(mt, models, histograms, &index)?;
+        let mut payload = Vec::new();
+        payload::write_info(&mut payload, mt.info(), metadata)?;
+        let mut front = vec![Section::new(Kind::INFO, payload)?];
+        if mt.info().kind.is_paged() {
+            index.round(mt.info());
+            index.shared = shared.iter().map(Section::len).sum();
+            front.push(Section::written(Kind::INDX, |out| index.write(out, mt.info()))?);
+        }
+        front.extend(shared);
+        Ok(Self { front, of_blocks: Vec::new(), behind: Vec::new(), has_exact: false })
     }
-    writer.flush().map_err(EncodeError::Write)?;
-    Ok(total)
+
+    /// Writes it; `put_blocks` puts all sections of the blocks. Returns the bytes of the file.
+    pub fn write<C: Codec>(
+        &self,
+        mt: &C,
+        writer: &mut dyn io::Write,
+        put_blocks: &mut dyn FnMut(PutBytes<'_>) -> Result<(), EncodeError>,
+    ) -> Result<u64, EncodeError> {
+        let sums = |section: &Section| (section.len(), section.head.crc);
+        let front = self.front.iter().map(sums).chain(self.of_blocks.iter().copied());
+        let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
+        let mut totals = Totals { updates: mt.updates(), sections: 0, crc: 0 };
+        let mut chain = checksum::Hasher::new();
+        for (len, crc) in front.chain(self.behind.iter().map(sums)) {
+            total += len;
+            totals.sections += 1;
+            chain.update(&crc.to_le_bytes());
+        }
+        totals.crc = chain.finalize();
+        let end = Section::written(Kind::ENDF, |out| payload::write_end(out, totals))?;
+        let put: PutBytes<'_> = &mut |bytes| writer.write_all(bytes).map_err(EncodeError::Write);
+        put(&header(Start {
+            total: Some(total),
+            tet_errors: mt.has_tet_errors(),
+            sides: mt.regions().is_some_and(Regions::has_sides),
+            exact: self.has_exact,
+        }))?;
+        self.front.iter().try_for_each(|section| section.put(put))?;
+        put_blocks(put)?;
+        self.behind.iter().chain([&end]).try_for_each(|section| section.put(put))?;
+        writer.flush().map_err(EncodeError::Write)?;
+        Ok(total)
+    }
+}
+
+/// The tables for an MT, given how often each symbol occurs in its updates.
+pub fn models(mut counts: Counts, mt: &impl Codec) -> Models {
+    put_base(&mut counts, mt);
+    Models::new(&counts)
 }
 
 /// What a decoder would refuse must not be written.
-fn check<C: Codec>(mt: &C) -> Result<(), EncodeError> {
+pub fn check<C: Codec>(mt: &C) -> Result<(), EncodeError> {
     if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&mt.page_bits()) {
         return Err(EncodeError::Blocks { bits: mt.page_bits() });
     }
     let info = mt.info();
-    if mt.present() != info.updates {
-        return Err(EncodeError::Incomplete { updates: mt.present(), expected: info.updates });
-    }
     mt.base().check(info).map_err(EncodeError::Base)?;
     C::check_counts(info, mt.base().positions.len() as u64).map_err(EncodeError::Base)
-}
-
-/// All sections but the last.
-fn sections<C: Codec>(
-    mt: &C,
-    metadata: &BTreeMap<String, String>,
-    scan: BlockScan,
-    exact: &[(u32, Corrections)],
-) -> Result<Vec<Section>, EncodeError> {
-    let mut counts = mt.count_updates()?;
-    put_base(&mut counts, mt);
-    exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
-    let models = Models::new(&counts);
-    let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks: scan.blocks };
-    let shared = shared_sections(mt, &models, scan.histograms.as_ref(), &index)?;
-    let of_blocks = mt.sections(&models)?;
-    let mut payload = Vec::new();
-    payload::write_info(&mut payload, mt.info(), metadata)?;
-    let mut sections = vec![Section::new(Kind::INFO, payload)?];
-    if mt.info().kind.is_paged() {
-        index.round(mt.info());
-        index.shared = shared.iter().map(Section::len).sum();
-        for (block, sections) in index.blocks.iter_mut().zip(&of_blocks) {
-            block.lengths = sections.iter().map(|section| section.len() as u32).collect();
-        }
-        sections.push(Section::written(Kind::INDX, |out| index.write(out, mt.info()))?);
-    }
-    sections.extend(shared);
-    sections.extend(of_blocks.into_iter().flatten());
-    for (field, corrections) in exact {
-        let head = [*field, u32::from(!corrections.is_single()), corrections.count()];
-        sections.push(Section::coded(Kind::EXACT, &head, &models, |out| corrections.put(out))?);
-    }
-    Ok(sections)
 }
 
 /// What stands in front of the blocks, without the description and the index.

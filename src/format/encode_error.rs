@@ -1,6 +1,7 @@
 //! Why an MT cannot be written to a file.
 
-use crate::mt::{BaseMeshError, UpdateError};
+use super::FormatError;
+use crate::mt::{BaseMeshError, ConvertError, UpdateError};
 use std::io;
 use thiserror::Error;
 
@@ -56,6 +57,13 @@ pub enum EncodeError {
     /// The description or the base mesh could not be read back.
     #[error("the MT cannot be written")]
     Base(#[source] BaseMeshError),
+    /// The MT that is written while it is made cannot be completed.
+    #[error("the MT could not be completed")]
+    #[doc(hidden)]
+    Unmade(#[source] ConvertError),
+    /// Blocks that were put aside have not come back as they were.
+    #[error("what was put aside while the MT file was made is damaged")]
+    Kept(#[source] FormatError),
     /// The writer failed.
     #[error("the MT file could not be written")]
     Write(#[source] io::Error),

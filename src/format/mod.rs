@@ -10,6 +10,7 @@ mod checksum;
 mod coder;
 mod decode;
 mod encode;
+mod encode_blocks;
 mod encode_error;
 mod encode_options;
 mod error;
@@ -26,6 +27,8 @@ pub use decode::{Decoder, ErrorBytes, ExactStatus, Progress};
 #[doc(hidden)]
 pub use encode::breakdown;
 pub use encode::{encode, encode_to};
+#[doc(hidden)]
+pub use encode_blocks::{BlockEncoder, BlockShelf};
 pub use encode_error::EncodeError;
 pub use encode_options::EncodeOptions;
 pub use error::FormatError;

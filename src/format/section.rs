@@ -1,8 +1,12 @@
-//! A section that is ready to be written.
+//! A section that is ready to be written, and one that has been found among bytes.
 
 use super::coder::{Models, Writer};
 use super::header::{HEAD_BYTES, Kind, SectionHead};
-use super::{EncodeError, write};
+use super::read::Reader;
+use super::{EncodeError, FormatError, write};
+
+/// Takes bytes of a file.
+pub type PutBytes<'a> = &'a mut dyn FnMut(&[u8]) -> Result<(), EncodeError>;
 
 /// The head of a section and what follows it.
 pub struct Section {
@@ -40,8 +44,36 @@ impl Section {
         })
     }
 
+    /// Puts the head and the payload.
+    pub fn put(&self, put: PutBytes<'_>) -> Result<(), EncodeError> {
+        put(&self.head.to_bytes())?;
+        put(&self.payload)
+    }
+
     /// Bytes with the head.
     pub fn len(&self) -> u64 {
         (HEAD_BYTES + self.payload.len()) as u64
     }
+}
+
+/// A whole section, its checksum verified, and the bytes behind it.
+pub struct FoundSection<'a> {
+    pub kind: Kind,
+    pub content: Reader<'a>,
+    pub behind: &'a [u8],
+}
+
+/// The section at the start of `bytes`, which are at `offset` in the file; `short` is the error if there are too few of them.
+pub fn find_section(
+    bytes: &[u8],
+    offset: u64,
+    short: impl Fn() -> FormatError,
+) -> Result<FoundSection<'_>, FormatError> {
+    let (head, behind) = bytes.split_first_chunk::<HEAD_BYTES>().ok_or_else(&short)?;
+    let head = SectionHead::parse(head);
+    let (payload, behind) = behind.split_at_checked(head.length as usize).ok_or_else(&short)?;
+    if SectionHead::new(head.kind, payload).crc != head.crc {
+        return Err(FormatError::Corrupt { offset, what: "the checksum of a section does not match" });
+    }
+    Ok(FoundSection { kind: head.kind, content: Reader::new(payload, offset + HEAD_BYTES as u64), behind })
 }

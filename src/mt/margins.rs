@@ -1,6 +1,7 @@
 //! Do errors fall along the partial order, by as much as requests for values rely on?
 
-use super::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, UpdateId};
+use super::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, PagedArray, UpdateId};
+use std::ops::Range;
 
 /// Follows the updates of an MT in their order, each before it is applied.
 ///
@@ -13,9 +14,14 @@ use super::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, UpdateId};
 pub struct Margins {
     /// Levels of each field's whole range: by so many an error of 1 widens a range.
     levels: Vec<f64>,
-    /// The ranges of levels of what each update removes, field by field.
-    removed: Vec<[i32; 2]>,
+    /// For each field the ranges of levels of what each update removes.
+    removed: Vec<PagedArray<[i32; 2]>>,
+    /// So many updates have been taken.
+    len: u32,
 }
+
+/// The range of no level.
+const NO_LEVEL: [i32; 2] = [i32::MAX, i32::MIN];
 
 /// An update whose error is too large for one of its parents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +39,8 @@ const SLACK: f64 = 1e-6;
 
 impl Margins {
     pub fn new(info: &MtInfo) -> Self {
-        let levels = info.fields.iter().map(|field| field.range() / field.step).collect();
-        Self { levels, removed: Vec::new() }
+        let levels: Vec<f64> = info.fields.iter().map(|field| field.range() / field.step).collect();
+        Self { removed: vec![PagedArray::new(NO_LEVEL); levels.len()], levels, len: 0 }
     }
 
     pub fn fields(&self) -> usize {
@@ -60,21 +66,24 @@ impl Margins {
         let tets = tets.iter().filter_map(|&t| Some((mt.creator(mesh, t), mesh.tet(t)?)));
         let tets = tets.map(|(parent, corners)| (parent, corners.map(|v| mesh.levels(v))));
         self.find_beyond(tets.clone(), parents, beyond);
-        let update = self.removed.len() / self.levels.len().max(1);
-        self.note(UpdateId(update as u32), tets.flat_map(|(_, levels)| levels));
+        self.note(UpdateId(self.len), tets.flat_map(|(_, levels)| levels));
     }
 
     /// Takes an update, given the levels of the vertices of what it removes.
     pub fn note<'a>(&mut self, update: UpdateId, vertices: impl Iterator<Item = &'a [i32]>) {
-        let own = update.0 as usize * self.levels.len();
-        if self.removed.len() < own + self.levels.len() {
-            self.removed.resize(own + self.levels.len(), [i32::MAX, i32::MIN]);
-        }
+        let mut own = vec![NO_LEVEL; self.levels.len()];
         for levels in vertices {
-            for (all, &level) in self.removed[own..].iter_mut().zip(levels) {
+            for (all, &level) in own.iter_mut().zip(levels) {
                 *all = [all[0].min(level), all[1].max(level)];
             }
         }
+        self.removed.iter_mut().zip(own).for_each(|(removed, own)| removed.set(update.0, own));
+        self.len = self.len.max(update.0 + 1);
+    }
+
+    /// Forgets updates on which no other one depends that is still to be taken.
+    pub(crate) fn forget(&mut self, updates: Range<u32>) {
+        self.removed.iter_mut().for_each(|removed| removed.forget(updates.clone()));
     }
 
     /// Appends the parents of an update, ascending, and for each and every field how many levels what they created is beyond the range of
@@ -105,10 +114,11 @@ impl Margins {
             for field in 0..fields {
                 let values = corners.map(|levels| levels.get(field).copied().unwrap_or(0));
                 let (low, high) = values.iter().fold((i32::MAX, i32::MIN), |(l, h), &x| (l.min(x), h.max(x)));
-                // An update that depends on a later one is refused elsewhere.
-                let Some(&[least, most]) = self.removed.get(parent.0 as usize * fields + field) else {
+                let [least, most] = self.removed[field].get(parent.0);
+                if least > most {
+                    // An update that depends on a later one is refused elsewhere.
                     continue;
-                };
+                }
                 let beyond = &mut beyond[start + at * fields + field];
                 *beyond = (*beyond).max(high.saturating_sub(most)).max(least.saturating_sub(low));
             }

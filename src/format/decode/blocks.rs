@@ -1,29 +1,12 @@
 //! Blocks and exact values that come by themselves: where they are in the file, and how their bytes are taken.
 
 use super::{Decoder, ExactStatus, Stage};
-use crate::format::header::{END_BYTES, HEAD_BYTES, Kind, SectionHead};
+use crate::format::header::{END_BYTES, HEAD_BYTES, Kind};
 use crate::format::read::Reader;
+use crate::format::section::{FoundSection, find_section};
 use crate::format::{FormatError, Index};
 use crate::mt::{PageError, UpdatePages};
 use std::ops::Range;
-
-/// A whole section, its checksum verified, and the bytes behind it.
-struct Section<'a> {
-    kind: Kind,
-    content: Reader<'a>,
-    behind: &'a [u8],
-}
-
-/// The section at the start of `bytes`, which are at `offset` in the file; `short` is the error if there are too few of them.
-fn section(bytes: &[u8], offset: u64, short: impl Fn() -> FormatError) -> Result<Section<'_>, FormatError> {
-    let (head, behind) = bytes.split_first_chunk::<HEAD_BYTES>().ok_or_else(&short)?;
-    let head = SectionHead::parse(head);
-    let (payload, behind) = behind.split_at_checked(head.length as usize).ok_or_else(&short)?;
-    if SectionHead::new(head.kind, payload).crc != head.crc {
-        return Err(FormatError::Corrupt { offset, what: "the checksum of a section does not match" });
-    }
-    Ok(Section { kind: head.kind, content: Reader::new(payload, offset + HEAD_BYTES as u64), behind })
-}
 
 impl Decoder {
     /// The bytes of the file that hold a block of a half-edge MT with the wanted fields, in ranges that do not touch; empty if there is
@@ -123,7 +106,7 @@ impl Decoder {
             let offset = start + (bytes.len() - rest.len()) as u64;
             let corrupt = |what| FormatError::Corrupt { offset, what };
             let short = || corrupt("the bytes behind the blocks do not end with a section");
-            let Section { kind, content, behind } = section(rest, offset, short)?;
+            let FoundSection { kind, content, behind } = find_section(rest, offset, short)?;
             match kind {
                 Kind::EXACT => self.open_exact(content)?,
                 kind if kind.is_skippable() && !kind.is_known() => {}
@@ -159,7 +142,7 @@ impl Decoder {
         let mut rest = bytes;
         for part in (0..=fields).filter(|&part| part == 0 || self.head.place(part - 1).is_some()) {
             let at = offset + (bytes.len() - rest.len()) as u64;
-            let Section { kind, content, behind } = section(rest, at, short)?;
+            let FoundSection { kind, content, behind } = find_section(rest, at, short)?;
             if kind != kinds[usize::from(part > 0)] {
                 return Err(FormatError::Corrupt { offset: at, what: "a section is out of place" });
             }

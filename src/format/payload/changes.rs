@@ -2,7 +2,7 @@
 
 use crate::format::FormatError;
 use crate::format::coder::{Family, Put, Source};
-use crate::mt::{ErrorCode, UpdateId};
+use crate::mt::ErrorCode;
 
 /// The upper byte of the least code that is no smaller than an error and has nothing below that byte; 255 stands for any error.
 pub fn upper_byte(error: ErrorCode) -> u8 {
@@ -29,11 +29,11 @@ pub fn range_of(number: u32, ends: &[u32]) -> u32 {
 }
 
 /// Puts errors and residuals of levels, update by update, by the families of both.
-pub fn put_changes(
+pub fn put_changes<U>(
     out: &mut impl Put,
     [error, level]: [Family; 2],
-    updates: impl Iterator<Item = UpdateId> + Clone,
-    change: impl Fn(UpdateId) -> (ErrorCode, i32),
+    updates: impl Iterator<Item = U> + Clone,
+    change: impl Fn(U) -> (ErrorCode, i32),
 ) {
     let codes = updates.clone().map(|u| change(u).0.0);
     let (largest, is_fine) =

@@ -11,7 +11,7 @@ use crate::format::coder::{Counts, Family, Models, Put, Source, Writer};
 use crate::format::error::Result;
 use crate::format::header::Kind;
 use crate::format::limits::check_bytes;
-use crate::format::section::Section;
+use crate::format::section::{FoundSection, Section, find_section};
 use crate::format::{EncodeError, FormatError, Limits};
 use crate::mesh::NONE;
 use crate::mt::{
@@ -158,8 +158,12 @@ impl Codec for HalfEdgeMt {
     }
 
     fn put_block(&self, out: &mut impl Put, updates: Range<u32>, _: &mut ()) -> Result<(), UpdateError> {
-        put(out, self, updates.clone());
-        (0..self.info().fields.len()).for_each(|field| put_field(out, self, updates.clone(), field));
+        let rows: Vec<HalfEdgeUpdate<'_>> =
+            updates.clone().filter_map(|u| self.update(UpdateId(u))).collect();
+        put(out, &rows, updates.start >> self.page_bits(), self.page_bits());
+        for field in 0..self.info().fields.len() {
+            put_field(out, &rows, field, self.jumps().is_some_and(|jumps| jumps[field]));
+        }
         Ok(())
     }
 
@@ -200,14 +204,71 @@ fn blocks(mt: &HalfEdgeMt) -> usize {
 }
 
 /// The sections of a block: one that all fields share, and one for each field.
-fn sections_of(mt: &HalfEdgeMt, block: u32, models: &Models) -> Result<Vec<Section>, EncodeError> {
-    let updates = mt.page_updates(block);
-    let shared = Section::coded(HalfEdgeMt::SECTION, &[block], models, |out| put(out, mt, updates.clone()));
+pub fn sections_of(mt: &HalfEdgeMt, block: u32, models: &Models) -> Result<Vec<Section>, EncodeError> {
+    let updates = mt.page_updates(block).filter_map(|u| mt.update(UpdateId(u)));
+    sections_of_rows(&updates.collect::<Vec<_>>(), block, mt, models)
+}
+
+/// [`sections_of`] these updates, which need not be in the MT.
+fn sections_of_rows(
+    updates: &[HalfEdgeUpdate<'_>],
+    block: u32,
+    mt: &HalfEdgeMt,
+    models: &Models,
+) -> Result<Vec<Section>, EncodeError> {
+    let put = |out: &mut Writer<'_>| put(out, updates, block, mt.page_bits());
+    let shared = Section::coded(HalfEdgeMt::SECTION, &[block], models, put);
     let of_field = |field: usize| {
-        let put = |out: &mut Writer<'_>| put_field(out, mt, updates.clone(), field);
+        let jumps = mt.jumps().is_some_and(|jumps| jumps[field]);
+        let put = |out: &mut Writer<'_>| put_field(out, updates, field, jumps);
         Section::coded(Kind::FLDU, &[block, field as u32], models, put)
     };
     std::iter::once(shared).chain((0..mt.info().fields.len()).map(of_field)).collect()
+}
+
+/// The sections of a block by other tables, given those that [`sections_of`] has made by `before`, one behind the other.
+pub fn recoded(
+    bytes: &[u8],
+    block: u32,
+    mt: &HalfEdgeMt,
+    [before, models]: [&Models; 2],
+) -> Result<Vec<Section>, EncodeError> {
+    let (shared, fields) = reread(bytes, block, mt, before).map_err(EncodeError::Kept)?;
+    let mut sections = Ok(Vec::new());
+    let made = shared.with_rows(&fields, |updates| {
+        sections = sections_of_rows(updates, block, mt, models);
+        Ok(())
+    });
+    made.map_err(EncodeError::Kept)?;
+    sections
+}
+
+/// What stands in the sections of a block.
+fn reread(
+    bytes: &[u8],
+    block: u32,
+    mt: &HalfEdgeMt,
+    models: &Models,
+) -> Result<(Insertions, Vec<FieldPart>)> {
+    let (info, updates) = (mt.info(), mt.page_updates(block));
+    let (mut rest, limits) = (bytes, Limits::default());
+    let (mut shared, mut fields) = (Insertions::default(), Vec::new());
+    for part in 0..=info.fields.len() {
+        let short = || FormatError::Truncated { offset: (bytes.len() - rest.len()) as u64 };
+        let FoundSection { mut content, behind, .. } = find_section(rest, 0, short)?;
+        rest = behind;
+        (0..=usize::from(part > 0)).try_for_each(|_| content.varint().map(drop))?;
+        let mut source = Source::new(content, models)?;
+        match part.checked_sub(1) {
+            None => shared = read(&mut source, info, mt.page_bits(), updates.clone(), &limits)?,
+            Some(field) => {
+                let jumps = mt.jumps().is_some_and(|jumps| jumps[field]);
+                fields.push(read_field(&mut source, updates.len() as u32, jumps)?);
+            }
+        }
+        source.end()?;
+    }
+    Ok((shared, fields))
 }
 
 /// What forest children are coded relative to: the blocks named so far, the last first, each with the last child in it.
@@ -387,11 +448,11 @@ fn read_star(source: &mut Source<'_>, star: &mut Vec<u8>) -> Result<()> {
     Ok(())
 }
 
-/// Puts updates that are a block, without what they do to fields.
-fn put(out: &mut impl Put, mt: &HalfEdgeMt, updates: Range<u32>) {
-    let mut named = Named::behind(updates.start >> mt.page_bits());
-    for update in updates.filter_map(|u| mt.update(UpdateId(u))) {
-        put_children(out, &mut named, update.children, mt.page_bits());
+/// Puts updates that are a block of `2^bits`, without what they do to fields.
+fn put(out: &mut impl Put, updates: &[HalfEdgeUpdate<'_>], block: u32, bits: u32) {
+    let mut named = Named::behind(block);
+    for update in updates {
+        put_children(out, &mut named, update.children, bits);
         put_star(out, update.star);
     }
 }
@@ -407,6 +468,15 @@ impl Insertions {
     /// Adds them to an MT as a page, with what they do to each of its fields.
     pub fn insert(self, mt: &mut HalfEdgeMt, page: u32, fields: &[FieldPart], limits: &Limits) -> Result<()> {
         check_bytes(mt.bytes() + self.bytes(fields.len() as u64), limits)?;
+        self.with_rows(fields, |updates| Ok(mt.insert_page(page, updates)?))
+    }
+
+    /// Uses them with what they do to each field.
+    fn with_rows<T>(
+        &self,
+        fields: &[FieldPart],
+        with: impl FnOnce(&[HalfEdgeUpdate<'_>]) -> Result<T>,
+    ) -> Result<T> {
         let stride = fields.len().max(1);
         let rows = 0..self.stars.len();
         let residuals: Vec<i32> =
@@ -424,7 +494,7 @@ impl Insertions {
                 errors,
             })
             .collect();
-        Ok(mt.insert_page(page, &updates)?)
+        with(&updates)
     }
 
     /// Bytes that they take in memory, in an MT of so many fields.
@@ -456,17 +526,14 @@ pub fn read(
     Ok(insertions)
 }
 
-/// Puts what updates do to a field.
-fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, updates: Range<u32>, field: usize) {
-    put_changes(out, [ERROR, LEVEL], updates.clone().map(UpdateId), |u| {
-        // Whoever writes an MT has all of its updates.
-        mt.update(u)
-            .map_or((ErrorCode::ZERO, 0), |update| (update.errors[field], update.level_residuals[field]))
-    });
-    if mt.jumps().is_some_and(|jumps| jumps[field]) {
-        let fields = mt.info().fields.len();
+/// Puts what updates do to a field; `jumps`: at interfaces, too.
+fn put_field(out: &mut impl Put, updates: &[HalfEdgeUpdate<'_>], field: usize, jumps: bool) {
+    let change = |update: &HalfEdgeUpdate<'_>| (update.errors[field], update.level_residuals[field]);
+    put_changes(out, [ERROR, LEVEL], updates.iter(), change);
+    if jumps {
         let mut before = 0;
-        for update in updates.filter_map(|u| mt.update(UpdateId(u))) {
+        for update in updates {
+            let fields = update.errors.len();
             let count = (update.side_residuals.len() / fields) as u32;
             out.number(SIDES, before, count);
             before = count;

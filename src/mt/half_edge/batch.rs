@@ -8,13 +8,13 @@ use super::refusal::{damaged, refused};
 use super::removers::{Remover, set_removers};
 use super::scratch::Scratch;
 use super::star_code::StarCode;
-use super::store::{HalfEdgeMt, HalfEdgeUpdate};
+use super::store::{ForestChild, HalfEdgeMt, HalfEdgeUpdate};
 use crate::mt::facts::MtFacts;
 use crate::mt::pages::Rows;
 use crate::mt::reaches::Reaches;
 use crate::mt::{
-    Applied, ConvertError, CurrentMesh, ErrorCode, Excess, Margins, MultiTessellation, UpdateError, UpdateId,
-    VertexId,
+    Applied, ConvertError, CurrentMesh, ErrorCode, Excess, Margins, MultiTessellation, PagedArray,
+    UpdateError, UpdateId, VertexId,
 };
 use crate::threads;
 use std::ops::Range;
@@ -25,6 +25,9 @@ const SHARE: usize = 32;
 /// The next update.
 #[doc(hidden)]
 pub struct NextUpdate<'a> {
+    /// Its near vertex, and how far from it the new vertex is, in lattice steps.
+    pub near: u32,
+    pub offset: [i32; 3],
     /// The levels of the new vertex.
     pub levels: &'a [i32],
     /// Where fields jump, its levels in single regions; in others it has those above.
@@ -40,6 +43,8 @@ pub struct NextUpdate<'a> {
 pub(super) struct Batch {
     /// The first of them.
     first: u32,
+    /// The near vertex of each, and how far from it the new vertex is.
+    near: Vec<(u32, [i32; 3])>,
     /// Update by update and field by field.
     levels: Vec<i32>,
     errors: Vec<ErrorCode>,
@@ -96,6 +101,8 @@ struct AppliedUpdate {
 
 /// The stars of consecutive updates, coded.
 struct Coded {
+    /// The updates beside the vertex of each.
+    children: Rows<ForestChild>,
     /// Their codes, and where each ends.
     stars: Vec<u8>,
     ends: Vec<usize>,
@@ -125,6 +132,7 @@ impl Coded {
     /// Without codes yet, with room for those of so many updates.
     fn with_room(updates: usize, fields: usize) -> Self {
         Self {
+            children: Rows::new(),
             stars: Vec::new(),
             ends: Vec::with_capacity(updates),
             residuals: vec![0; updates * fields],
@@ -159,6 +167,7 @@ impl Coded {
         let (labels, children) = (star.link.iter().map(|v| v.0), |label| forest.children(label));
         code.write((star.update, star.vertex), tets, labels, places, children, &mut self.stars)
             .ok_or_else(|| refused(update))?;
+        self.children.push(forest.children(star.vertex));
         self.ends.push(self.stars.len());
         self.bounds.push(star.bounds());
         self.ranges.extend(star.ranges());
@@ -237,6 +246,7 @@ impl Batch {
     /// Empties it for updates from `first` on.
     pub fn clear(&mut self, first: u32) {
         self.first = first;
+        self.near.clear();
         self.levels.clear();
         self.errors.clear();
         self.removers.clear();
@@ -252,6 +262,7 @@ impl Batch {
 
     /// Adds the next update.
     pub fn push(&mut self, next: &NextUpdate<'_>, star: impl Iterator<Item = Remover>) {
+        self.near.push((next.near, next.offset));
         self.levels.extend_from_slice(next.levels);
         self.errors.extend_from_slice(next.errors);
         self.faces.extend_from_slice(next.faces);
@@ -264,6 +275,47 @@ impl Batch {
         self.sides.push(&sides);
         self.removers.extend(star);
         self.remover_ends.push(self.removers.len());
+    }
+
+    /// Notes what its updates, which have been coded, reach, and how long the chains are that lead to them.
+    pub fn note_reaches(
+        &self,
+        coded: &CodedBatch,
+        mt: &HalfEdgeMt,
+        reaches: &mut Reaches,
+        chains: &mut Chains,
+    ) {
+        let fields = mt.info().fields.len();
+        let mut next = self.first;
+        for coded in &coded.0 {
+            for (at, &end) in coded.parent_ends.iter().enumerate() {
+                let (update, own) = (UpdateId(next), &self.applied[(next - self.first) as usize]);
+                let parents = &coded.parents[before(at, |at| coded.parent_ends[at])..end];
+                reaches.push(update, coded.bounds[at], &coded.ranges[at * fields..][..fields], parents);
+                if mt.regions().is_some() {
+                    reaches.push_regions(update, own.regions.clone());
+                }
+                chains.push(update, parents);
+                next += 1;
+            }
+        }
+    }
+
+    /// Notes the errors of its updates.
+    pub fn note_errors(&self, errors: &mut [PagedArray<ErrorCode>]) {
+        let fields = errors.len();
+        for (field, errors) in errors.iter_mut().enumerate() {
+            let own = self.errors.iter().skip(field).step_by(fields);
+            (self.first..).zip(own).for_each(|(u, &error)| errors.set(u, error));
+        }
+    }
+
+    /// Forgets what coding the stars takes, once that is done.
+    pub fn forget_stars(&mut self) {
+        let Self { first, levels, errors, remover_ends, jumping, applied, .. } = std::mem::take(self);
+        let residuals = jumping.residuals;
+        let jumping = Jumping { residuals, ..Jumping::default() };
+        *self = Self { first, levels, errors, remover_ends, jumping, applied, ..Self::default() };
     }
 
     /// What is given of the star of the `i`-th update: what removes it, and the faces if there are any.
@@ -286,30 +338,28 @@ impl Batch {
         Some(self.errors_of(i as usize, fields)[field])
     }
 
-    /// Applies the updates to the mesh of those before, and takes down their stars. `names` decide on the order of faces.
+    /// Applies the updates to the mesh of those before, and takes down their stars. The names of the forest decide on the order of faces.
     pub fn apply(
         &mut self,
         mt: &HalfEdgeMt,
         forest: &Forest,
-        names: &[u32],
         mesh: &mut CurrentMesh,
         scratch: &mut Scratch,
     ) -> Result<(), ConvertError> {
-        (0..self.len()).try_for_each(|i| self.apply_one(mt, forest, names, mesh, scratch, i))
+        (0..self.len()).try_for_each(|i| self.apply_one(mt, forest, mesh, scratch, i))
     }
 
     fn apply_one(
         &mut self,
         mt: &HalfEdgeMt,
         forest: &Forest,
-        names: &[u32],
         mesh: &mut CurrentMesh,
         scratch: &mut Scratch,
         i: usize,
     ) -> Result<(), ConvertError> {
         let update = self.first + i as u32;
         let (u, refused) = (UpdateId(update), || refused(update));
-        let near = forest.near(update).ok_or_else(refused)?;
+        let (near, offset) = self.near[i];
         let slot = mesh.slot(VertexId(near)).ok_or_else(refused)?;
         let vertex = mt.vertex(u);
         let first = match mesh.tagged(update) {
@@ -325,7 +375,6 @@ impl Batch {
             Applied::Blocked(_) => return Err(refused()),
         }
         scratch.find_star(mesh).ok_or_else(refused)?;
-        let offset = forest.offset(update, near).ok_or_else(refused)?;
         let position = [0, 1, 2].map(|k| mesh.positions[slot as usize][k].saturating_add(offset[k]));
         if mt.has_sides() {
             self.take_sides(i, mesh, position, scratch);
@@ -336,7 +385,7 @@ impl Batch {
         if !scratch.levels.chunks(mesh.fields).all(|levels| mt.info().holds(position, levels)) {
             return Err(damaged(UpdateError::OffLattice { update }));
         }
-        set_removers(scratch, mesh, names, vertex, self.given(i)).ok_or_else(refused)?;
+        set_removers(scratch, mesh, forest, vertex, self.given(i)).ok_or_else(refused)?;
         self.star.extend_from_slice(&scratch.star[..scratch.star_len]);
         for &slot in &scratch.link[..scratch.link_len] {
             self.link.push((mesh.vertex(slot).0, mesh.positions[slot as usize]));
@@ -409,21 +458,13 @@ impl Batch {
     }
 
     /// Codes the stars of the updates that have been applied.
-    /// Those before are in the MT, or in `waiting`.
-    pub fn code(
-        &self,
-        mt: &HalfEdgeMt,
-        forest: &Forest,
-        waiting: &[(Self, CodedBatch)],
-        margins: &mut Margins,
-    ) -> CodedBatch {
-        let fields = mt.info().fields.len();
+    pub fn code(&self, before: Before<'_>, forest: &Forest, margins: &mut Margins) -> CodedBatch {
+        let fields = before.mt.info().fields.len();
         for i in 0..self.applied.len() {
             let [.., levels] = self.ranges(i);
             margins.note(UpdateId(self.first + i as u32), self.link_levels[levels].chunks(fields));
         }
         let margins = &*margins;
-        let before = Before { mt, waiting };
         let code = |range: Range<usize>| self.code_share(range, before, forest, margins);
         CodedBatch(threads::map(self.applied.len(), SHARE, code))
     }
@@ -494,31 +535,24 @@ impl Batch {
         &self,
         coded: CodedBatch,
         mt: &mut HalfEdgeMt,
-        forest: &Forest,
-        (facts, reaches): (&mut MtFacts, &mut Reaches),
+        facts: &mut MtFacts,
     ) -> Result<(), ConvertError> {
         let fields = mt.info().fields.len();
         for (share, coded) in coded.0.into_iter().enumerate() {
             for (at, &end) in coded.ends.iter().enumerate() {
                 let i = share * SHARE + at;
-                let u = UpdateId(self.first + i as u32);
                 let (own, sides) = match mt.has_sides() {
                     true => self.jumping.residuals.row(i).split_at(fields),
                     false => (&coded.residuals[at * fields..][..fields], &[][..]),
                 };
                 let record = HalfEdgeUpdate {
-                    children: forest.children(mt.vertex(u).0),
+                    children: coded.children.row(at),
                     level_residuals: own,
                     side_residuals: sides,
                     star: &coded.stars[before(at, |at| coded.ends[at])..end],
                     errors: self.errors_of(i, fields),
                 };
                 mt.push(&record).map_err(damaged)?;
-                let parents = &coded.parents[before(at, |at| coded.parent_ends[at])..coded.parent_ends[at]];
-                reaches.push(coded.bounds[at], &coded.ranges[at * fields..][..fields], parents);
-                if mt.regions().is_some() {
-                    reaches.push_regions(self.applied[i].regions.clone());
-                }
             }
             coded.faults.into_iter().for_each(|fault| facts.note(fault));
             coded.failed.map_or(Ok(()), Err)?;
@@ -527,19 +561,45 @@ impl Batch {
     }
 }
 
+/// The lengths of the longest chains of updates that lead to each, and that of the longest of all.
+pub(super) struct Chains {
+    lengths: PagedArray<u32>,
+    pub longest: u32,
+}
+
+impl Chains {
+    pub fn new() -> Self {
+        Self { lengths: PagedArray::new(0), longest: 0 }
+    }
+
+    fn push(&mut self, update: UpdateId, parents: &[UpdateId]) {
+        let length = 1 + parents.iter().map(|parent| self.lengths.get(parent.0)).max().unwrap_or(0);
+        self.lengths.set(update.0, length);
+        self.longest = self.longest.max(length);
+    }
+
+    /// Forgets updates on which no later one depends.
+    pub fn forget(&mut self, updates: Range<u32>) {
+        self.lengths.forget(updates);
+    }
+}
+
 /// The updates before those of a batch.
 #[derive(Clone, Copy)]
-struct Before<'a> {
-    mt: &'a HalfEdgeMt,
+pub(super) struct Before<'a> {
+    pub mt: &'a HalfEdgeMt,
+    /// For each field their errors, as far as they are known, where not all of their pages are in the MT.
+    pub errors: &'a [PagedArray<ErrorCode>],
     /// Those that are to be appended later.
-    waiting: &'a [(Batch, CodedBatch)],
+    pub waiting: &'a [(Batch, CodedBatch)],
 }
 
 impl Before<'_> {
     /// The error of an update in one of so many fields.
     fn error(&self, u: UpdateId, field: usize, fields: usize) -> ErrorCode {
         let waiting = self.waiting.iter().rev().find_map(|(batch, _)| batch.error(u, field, fields));
-        waiting.unwrap_or_else(|| self.mt.error_of_field(u, field))
+        let known = || self.errors.get(field).map(|errors| errors.get(u.0));
+        waiting.or_else(known).unwrap_or_else(|| self.mt.error_of_field(u, field))
     }
 }
 

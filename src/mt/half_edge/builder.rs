@@ -13,7 +13,7 @@
 //! ```
 
 pub use super::batch::NextUpdate;
-use super::batch::{Batch, CodedBatch};
+use super::batch::{Batch, Before, Chains, CodedBatch};
 #[doc(hidden)]
 pub use super::forest::Forest;
 use super::refusal::{damaged, refused};
@@ -24,10 +24,11 @@ use crate::mt::facts::{LevelVolumes, MtFacts};
 use crate::mt::reaches::Reaches;
 use crate::mt::regions::RegionSums;
 use crate::mt::{
-    ApplyUpdates, BaseMesh, BaseMeshError, ConvertError, CurrentMesh, Margins, MtInfo, MultiTessellation,
-    Regions, UpdateError,
+    ApplyUpdates, BaseMesh, BaseMeshError, ConvertError, CurrentMesh, ErrorCode, Margins, MtInfo,
+    MultiTessellation, PagedArray, Regions, UpdateError, UpdatePages,
 };
 use crate::threads;
+use std::ops::Range;
 
 /// Updates of a batch.
 const BATCH: usize = 1024;
@@ -37,7 +38,6 @@ const BATCH: usize = 1024;
 pub struct HalfEdgeBuilder {
     mt: HalfEdgeMt,
     forest: Forest,
-    names: Vec<u32>,
     margins: Margins,
     facts: MtFacts,
     reaches: Reaches,
@@ -45,7 +45,13 @@ pub struct HalfEdgeBuilder {
     regions: RegionSums,
     /// The mesh with all updates but those of the last batch, or a patch of it.
     mesh: CurrentMesh,
-    in_patches: bool,
+    /// The updates of the patch, if they come in patches.
+    of_patch: Vec<Range<u32>>,
+    /// Then, for each field, the errors of updates on which others may depend.
+    errors: Vec<PagedArray<ErrorCode>>,
+    chains: Chains,
+    /// So many pages have been taken.
+    taken: u32,
     scratch: Box<Scratch>,
     /// The number of the update that comes next.
     len: u32,
@@ -65,6 +71,8 @@ pub struct Patch {
     pub mesh: BaseMesh,
     /// The MT's number of each of its vertices.
     pub vertices: Vec<u32>,
+    /// Of these, and of those that the updates of the patch insert.
+    pub forest: Forest,
     pub marks: Vec<BaseMark>,
     /// The region of each tetrahedron, if the MT has regions.
     pub regions: Vec<u16>,
@@ -73,8 +81,7 @@ pub struct Patch {
 }
 
 impl HalfEdgeBuilder {
-    /// Without updates yet. `names` are numbers of the MT's vertices in another order, by which stars are sorted. Volumes, boxes
-    /// and colours of `regions` are found at the end.
+    /// Without updates yet. Volumes, boxes and colours of `regions` are found at the end.
     ///
     /// # Errors
     /// If the base mesh is not usable.
@@ -82,7 +89,7 @@ impl HalfEdgeBuilder {
         info: MtInfo,
         base: BaseMesh,
         marks: Vec<BaseMark>,
-        (forest, names): (Forest, Vec<u32>),
+        forest: Forest,
         regions: Option<Regions>,
         page_bits: u32,
     ) -> Result<Self, ConvertError> {
@@ -98,14 +105,16 @@ impl HalfEdgeBuilder {
         Ok(Self {
             margins: Margins::new(mt.info()),
             volumes: LevelVolumes::new(mt.info()),
+            reaches: Reaches::new(mt.info(), mt.page_bits()),
             regions: region_sums,
             mt,
             forest,
-            names,
             facts: MtFacts::default(),
-            reaches: Reaches::default(),
             mesh,
-            in_patches: false,
+            of_patch: Vec::new(),
+            errors: Vec::new(),
+            chains: Chains::new(),
+            taken: 0,
             scratch: Box::default(),
             len: 0,
             next: Batch::default(),
@@ -119,13 +128,15 @@ impl HalfEdgeBuilder {
     ///
     /// # Errors
     /// If the patch is not usable.
-    pub fn start_patch(&mut self, patch: &Patch) -> Result<(), ConvertError> {
+    pub fn start_patch(&mut self, patch: Patch) -> Result<(), ConvertError> {
         self.flush()?;
+        self.forest = patch.forest;
         let mut mesh = CurrentMesh::new(self.mt.info(), &patch.mesh).map_err(unusable)?;
         mesh.name_vertices(&patch.vertices);
         let regions = self.mt.regions().map(|_| (&patch.regions[..], &patch.side_levels[..]));
         self.mesh = self.mt.marked(mesh, &patch.marks, regions);
-        self.in_patches = true;
+        self.of_patch.clear();
+        self.errors.resize(self.mt.info().fields.len(), PagedArray::new(ErrorCode::ZERO));
         self.begin(self.mt.updates(), false);
         Ok(())
     }
@@ -147,10 +158,21 @@ impl HalfEdgeBuilder {
     /// As [`HalfEdgeBuilder::push`].
     pub fn end_patch(&mut self, is_reference: bool) -> Result<(), ConvertError> {
         self.flush()?;
+        if let Some(last) = self.of_patch.last_mut() {
+            last.end = self.len;
+        }
         if is_reference {
+            // No other patch has anything of these updates.
+            for updates in &self.of_patch {
+                self.errors.iter_mut().for_each(|errors| errors.forget(updates.clone()));
+                self.chains.forget(updates.clone());
+                self.margins.forget(updates.clone());
+            }
+            self.reaches.close_node(&self.of_patch);
             self.volumes.add(self.mt.info(), &self.mesh);
             self.regions.add(&self.mesh);
         } else {
+            self.reaches.end_node();
             self.regions.add_touching(&self.mesh);
         }
         Ok(())
@@ -162,12 +184,42 @@ impl HalfEdgeBuilder {
     /// As [`HalfEdgeBuilder::push`].
     pub fn append_waiting(&mut self) -> Result<(), ConvertError> {
         self.flush()?;
-        let Self { mt, forest, facts, reaches, waiting, .. } = self;
-        waiting.drain(..).try_for_each(|(batch, coded)| batch.append(coded, mt, forest, (facts, reaches)))
+        let Self { mt, errors, facts, waiting, .. } = self;
+        waiting.drain(..).try_for_each(|(batch, coded)| {
+            batch.note_errors(errors);
+            batch.append(coded, mt, facts)
+        })
+    }
+
+    /// Passes on the pages that are whole and have not been taken before; all that are left if `is_end`. They are not kept but for the last one.
+    pub(crate) fn take_pages<E>(
+        &mut self,
+        is_end: bool,
+        put: &mut dyn FnMut(&HalfEdgeMt, u32) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Self { mt, taken, .. } = self;
+        // Without the last page the MT would not know how many updates it has.
+        while mt.has_page(*taken + 1) || is_end && mt.has_page(*taken) {
+            put(mt, *taken)?;
+            if mt.has_page(*taken + 1) {
+                mt.drop_page(*taken);
+            }
+            *taken += 1;
+        }
+        Ok(())
+    }
+
+    /// The length of the longest chain of updates.
+    pub fn depth(&self) -> u32 {
+        self.chains.longest
     }
 
     /// Begins with new batches.
     fn begin(&mut self, first: u32, are_later: bool) {
+        if let Some(last) = self.of_patch.last_mut() {
+            last.end = self.len;
+        }
+        self.of_patch.push(first..first);
         (self.len, self.are_later) = (first, are_later);
         self.next.clear(first);
         self.applied.clear(first);
@@ -195,21 +247,28 @@ impl HalfEdgeBuilder {
 
     /// Applies the updates that have come, codes the stars of those before, and begins a new batch.
     fn turn(&mut self) -> Result<(), ConvertError> {
-        let Self { mt, forest, names, margins, facts, reaches, mesh, scratch, .. } = self;
-        let Self { next, applied, are_later, waiting, .. } = self;
-        let (grown, whole, tree, before) = (&mut *next, &*mt, &*forest, &waiting[..]);
+        let Self { mt, forest, margins, facts, reaches, mesh, scratch, .. } = self;
+        let Self { next, applied, are_later, waiting, errors, chains, .. } = self;
+        let (grown, whole) = (&mut *next, &*mt);
+        let before = Before { mt: whole, errors: &errors[..], waiting: &waiting[..] };
         let (done, coded) = threads::join(
-            || grown.apply(whole, tree, names, mesh, scratch),
-            || applied.code(whole, tree, before, margins),
+            || grown.apply(whole, forest, mesh, scratch),
+            || applied.code(before, forest, margins),
         );
+        applied.note_reaches(&coded, mt, reaches, chains);
         if !*are_later {
-            applied.append(coded, mt, forest, (facts, reaches))?;
+            applied.append(coded, mt, facts)?;
+            applied.note_errors(errors);
             if done.is_err() {
                 // What comes before the fault may have one itself.
-                next.append(next.code(mt, forest, waiting, margins), mt, forest, (facts, reaches))?;
+                let before = Before { mt: &*mt, errors: &errors[..], waiting: &waiting[..] };
+                let coded = next.code(before, forest, margins);
+                next.append(coded, mt, facts)?;
             }
         } else if applied.len() > 0 {
-            waiting.push((std::mem::take(applied), coded));
+            let mut applied = std::mem::take(applied);
+            applied.forget_stars();
+            waiting.push((applied, coded));
         }
         std::mem::swap(next, applied);
         next.clear(self.len);
@@ -226,20 +285,28 @@ impl HalfEdgeBuilder {
     ///
     /// # Errors
     /// As [`HalfEdgeBuilder::push`].
-    pub fn finish(mut self) -> Result<HalfEdgeMt, ConvertError> {
-        if self.in_patches {
+    pub fn finish(self) -> Result<HalfEdgeMt, ConvertError> {
+        let (mut mt, mut facts, reaches) = self.finish_without_reaches()?;
+        if mt.updates() == mt.info().updates {
+            facts.reaches = reaches.finish();
+            mt.set_facts(facts);
+        }
+        Ok(mt)
+    }
+
+    /// The MT, and what is known of it but for what its pages reach.
+    pub(crate) fn finish_without_reaches(mut self) -> Result<(HalfEdgeMt, MtFacts, Reaches), ConvertError> {
+        if !self.errors.is_empty() {
             self.append_waiting()?;
         } else {
             self.end_patch(true)?;
         }
         let Self { mut mt, mut facts, reaches, volumes, regions, .. } = self;
         if mt.updates() == mt.info().updates {
-            facts.reaches = reaches.of_pages(mt.pages.bits(), mt.info().fields.len());
             facts.volumes = volumes.finish();
             mt.state_regions(regions).ok_or(damaged(UpdateError::Cavity { update: mt.updates() }))?;
-            mt.set_facts(facts);
         }
-        Ok(mt)
+        Ok((mt, facts, reaches))
     }
 }
 

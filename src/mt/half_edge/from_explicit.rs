@@ -30,17 +30,16 @@ impl HalfEdgeMt {
             let [from, to] = [near[u as usize], base + u].map(|v| explicit.position(VertexId(v)));
             [0, 1, 2].map(|k| to[k] - from[k])
         };
-        let vertices = explicit.vertices();
-        let forest = Forest::new(vertices as usize, near.clone(), offset);
-        let names = (0..vertices).collect();
+        let forest = Forest::new((0..explicit.vertices()).collect(), &near, offset);
         let mut builder =
-            HalfEdgeBuilder::new(info, explicit.base().clone(), marks, (forest, names), None, page_bits)?;
+            HalfEdgeBuilder::new(info, explicit.base().clone(), marks, forest, None, page_bits)?;
         let mut star = Vec::new();
         for u in 0..updates {
             find_star(explicit, UpdateId(u), &mut star).ok_or(refused(u))?;
             let faces: Vec<[u32; 3]> = star.iter().map(|&(face, _)| face).collect();
             let levels = explicit.levels(VertexId(base + u));
-            let next = NextUpdate { levels, sides: &[], errors: explicit.errors(UpdateId(u)), faces: &faces };
+            let (near, errors) = (near[u as usize], explicit.errors(UpdateId(u)));
+            let next = NextUpdate { near, offset: offset(u), levels, sides: &[], errors, faces: &faces };
             let remover = |t: u32| (explicit.removed_by(t).map_or(NONE, |u| u.0), inner.bits[t as usize]);
             builder.push(&next, star.iter().map(|&(_, t)| remover(t)))?;
         }

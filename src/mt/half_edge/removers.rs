@@ -1,5 +1,6 @@
 //! What removes the tetrahedra of a star, and which of their faces go with them, from an order of faces to the corners of the star.
 
+use super::forest::Forest;
 use super::new_star::{MOST, NEW};
 use super::scratch::Scratch;
 use crate::mt::{CurrentMesh, VertexId};
@@ -20,7 +21,7 @@ pub fn by_corner(bits: u8, tet: [u32; 4]) -> u8 {
 pub(super) fn set_removers(
     scratch: &mut Scratch,
     mesh: &CurrentMesh,
-    names: &[u32],
+    forest: &Forest,
     vertex: VertexId,
     (removers, given): (&[Remover], &[[u32; 3]]),
 ) -> Option<()> {
@@ -30,7 +31,7 @@ pub(super) fn set_removers(
         return None;
     }
     // Names are compared once for each vertex: the rest goes by ranks.
-    let name = |v: VertexId| u64::from(names[v.0 as usize]);
+    let name = |v: VertexId| u64::from(forest.name(v.0));
     let mut sorted = [0; MOST + 1];
     let sorted = &mut sorted[..=link.len()];
     for (entry, (i, &slot)) in sorted.iter_mut().zip((0..).zip(link)) {

@@ -279,6 +279,12 @@ impl HalfEdgeMt {
         children.iter().for_each(|child| self.near.set(child.update, NONE));
     }
 
+    /// Takes a page away while it is being built: near vertices are not needed then.
+    pub(super) fn drop_page(&mut self, page: u32) {
+        self.pages.remove(page);
+        self.near.clear();
+    }
+
     /// Keeps what is known from having applied all updates.
     pub(super) fn set_facts(&mut self, facts: MtFacts) {
         self.facts = Some(Box::new(facts));

@@ -15,17 +15,17 @@ pub(crate) struct Ordered<'a> {
     pub vertices: &'a [u32],
     /// The near vertex of each update.
     pub near: &'a [u32],
-    /// For each tetrahedron of the base mesh, by the builder's places, the update that removes it, [`NONE`] if none does, and which of
-    /// its faces go with it: bit `i` is that of the face opposite the `i`-th vertex in ascending order.
+    /// See [`begin`].
     pub base_marks: &'a [(u32, u8)],
 }
 
 /// A half-edge MT that grows.
 pub(crate) struct Appender<'a> {
     builder: HalfEdgeBuilder,
-    /// Point by point and field by field.
-    levels: &'a [i32],
-    sides: &'a Sides,
+    near: &'a [u32],
+    /// The levels point by point and field by field.
+    points: Points<'a>,
+    len: usize,
     /// The MT's vertex for each reference point.
     number: Vec<u32>,
 }
@@ -33,58 +33,70 @@ pub(crate) struct Appender<'a> {
 /// Reference points: their positions, their levels, field by field, and those of their sides behind them.
 type Points<'a> = (&'a [[i32; 3]], &'a [i32], &'a Sides);
 
-/// The builder of an MT with this base mesh and these updates, none of which have been appended, and the MT's vertex for each reference point. The
-/// base tetrahedra of `regions` are in the order of the builder's places.
+/// The builder of an MT with this base mesh, without updates yet. `marks` has for each tetrahedron of the base mesh, by the builder's places, the
+/// update that removes it, [`NONE`] if none does, and which of its faces go with it: bit `i` is that of the face opposite the `i`-th vertex in
+/// ascending order. The base tetrahedra of `regions` are in the order of the builder's places. For the base vertices there are
+/// their points, to which `levels` and `sides` belong, and their names.
 pub(crate) fn begin(
     (info, regions): (MtInfo, Option<Regions>),
-    numbered: Numbered,
-    updates: &Ordered<'_>,
-    (positions, levels, sides): Points<'_>,
+    (base, [points, names]): (&Numbered, [&[u32]; 2]),
+    marks: &[(u32, u8)],
+    (levels, sides): (&[i32], &Sides),
+    forest: Forest,
     block_bits: u32,
-) -> Result<(HalfEdgeBuilder, Vec<u32>), BuildError> {
-    let Numbered { mesh, mut number, places } = numbered;
-    let base = mesh.positions.len();
-    for (u, &v) in (0..).zip(updates.vertices) {
-        number[v as usize] = base as u32 + u;
-    }
-    let mut points = vec![NONE; base + updates.vertices.len()];
-    let known = (0..).zip(&number).filter(|(_, v)| **v != NONE);
-    known.for_each(|(point, &v): (u32, _)| points[v as usize] = point);
-    let mut marks = Vec::with_capacity(mesh.tets.len());
-    for (tet, &place) in mesh.tets.iter().zip(&places) {
-        let (remover, inner) = updates.base_marks[place as usize];
-        marks.push(BaseMark { remover, inner: by_corner(inner, tet.map(|v| points[v as usize])) });
-    }
-    let regions = regions.map(|regions| Regions {
-        of_base: places.iter().map(|&place| regions.of_base[place as usize]).collect(),
-        ..regions
-    });
-    let regions = regions.map(|mut regions| {
-        if !sides.is_empty() {
-            regions.sides = base_sides(&mesh, &regions.of_base, &points, (levels, sides));
-        }
-        regions
-    });
-    let near = updates.near.iter().map(|&near| number[near as usize]).collect();
-    let offset = |u: u32| {
-        let [from, to] = [updates.near, updates.vertices].map(|all| positions[all[u as usize] as usize]);
-        [0, 1, 2].map(|k| to[k] - from[k])
+) -> Result<HalfEdgeBuilder, BuildError> {
+    let Numbered { mesh, places, .. } = base;
+    let mark = |(tet, &place): (&[u32; 4], &u32)| {
+        let (remover, inner) = marks[place as usize];
+        BaseMark { remover, inner: by_corner(inner, tet.map(|v| names[v as usize])) }
     };
-    let forest = Forest::new(points.len(), near, offset);
-    Ok((HalfEdgeBuilder::new(info, mesh, marks, (forest, points), regions, block_bits)?, number))
+    let marks = mesh.tets.iter().zip(places).map(mark).collect();
+    let regions = regions.map(|regions| {
+        let of_base: Vec<u16> = places.iter().map(|&place| regions.of_base[place as usize]).collect();
+        let sides = match sides.is_empty() {
+            true => regions.sides,
+            false => base_sides(mesh, &of_base, points, (levels, sides)),
+        };
+        Regions { of_base, sides, ..regions }
+    });
+    Ok(HalfEdgeBuilder::new(info, mesh.clone(), marks, forest, regions, block_bits)?)
+}
+
+/// The point of each vertex of a base mesh.
+pub(crate) fn points_of(base: &Numbered) -> Vec<u32> {
+    let mut names = vec![NONE; base.mesh.positions.len()];
+    let known = (0..).zip(&base.number).filter(|(_, v)| **v != NONE);
+    known.for_each(|(point, &v): (u32, _)| names[v as usize] = point);
+    names
+}
+
+/// How far one reference point is from another.
+fn offset(positions: &[[i32; 3]], from: u32, to: u32) -> [i32; 3] {
+    let [from, to] = [from, to].map(|point| positions[point as usize]);
+    [0, 1, 2].map(|k| to[k] - from[k])
 }
 
 impl<'a> Appender<'a> {
     /// [Begins](begin) with the base mesh.
     pub fn new(
         described: (MtInfo, Option<Regions>),
-        numbered: Numbered,
-        updates: &Ordered<'_>,
+        mut base: Numbered,
+        updates: &Ordered<'a>,
         points: Points<'a>,
         block_bits: u32,
     ) -> Result<Self, BuildError> {
-        let (builder, number) = begin(described, numbered, updates, points, block_bits)?;
-        Ok(Self { builder, levels: points.1, sides: points.2, number })
+        let (positions, levels, sides) = points;
+        let mut names = points_of(&base);
+        names.extend(updates.vertices);
+        for (v, &point) in (0..).zip(&names) {
+            base.number[point as usize] = v;
+        }
+        let near: Vec<u32> = updates.near.iter().map(|&near| base.number[near as usize]).collect();
+        let offset = |u: u32| offset(positions, updates.near[u as usize], updates.vertices[u as usize]);
+        let forest = Forest::new(names.clone(), &near, offset);
+        let builder =
+            begin(described, (&base, [&names; 2]), updates.base_marks, (levels, sides), forest, block_bits)?;
+        Ok(Self { builder, near: updates.near, points, len: 0, number: base.number })
     }
 
     /// Appends the next update. `star` has for each tetrahedron that it inserts, in the order of their faces opposite the new vertex,
@@ -95,10 +107,14 @@ impl<'a> Appender<'a> {
         errors: &[ErrorCode],
         star: impl Iterator<Item = (u32, u8)>,
     ) -> Result<(), BuildError> {
-        let levels_of = |point: u32| &self.levels[point as usize * errors.len()..][..errors.len()];
+        let (positions, levels, sides) = self.points;
+        let levels_of = |point: u32| &levels[point as usize * errors.len()..][..errors.len()];
         let sides: Vec<(u16, &[i32])> =
-            self.sides.further(vertex).map(|(point, region)| (region as u16, levels_of(point))).collect();
-        let next = NextUpdate { levels: levels_of(vertex), sides: &sides, errors, faces: &[] };
+            sides.further(vertex).map(|(point, region)| (region as u16, levels_of(point))).collect();
+        let near = self.near[self.len];
+        self.len += 1;
+        let (near, offset) = (self.number[near as usize], offset(positions, near, vertex));
+        let next = NextUpdate { near, offset, levels: levels_of(vertex), sides: &sides, errors, faces: &[] };
         Ok(self.builder.push(&next, star)?)
     }
 

@@ -2,29 +2,52 @@
 //!
 //! Each node has ordered its own updates into blocks. They are numbered from the last node down to the parts, which extends the partial order, and
 //! appended in this order, as for a whole. The mesh to which they are applied is never there as a whole: what is left of a node is all that its
-//! own updates remove, a patch.
+//! own updates remove, a patch. Nor is the MT, unless it is asked for: whole blocks are taken as they come, and which updates there are beside which
+//! vertex is kept in the scratch. In memory are a few numbers for each update, and one node.
+//!
+//! ```text
+//!     updates of all nodes ──▶ what each inserts, beside which vertex ──▶ by vertices, in the scratch
+//!                                                                                 │ of the vertices of a patch
+//!     node: what is left ──▶ patch ─────────────────────────┐                     ▼
+//!           its updates ────────────────────────────▶ HalfEdgeBuilder ──▶ blocks, taken
+//! ```
 
 use super::PartsError;
+use super::children::{ChildSorter, Children};
 use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
-use crate::decimate::append::{self, Ordered};
+use super::scratch::{InMemory, Scratch};
+use crate::decimate::append;
 use crate::lattice::sides::Sides;
-use crate::order::base::{Numbered, number_base};
+use crate::order::base::number_base;
 use crate::{BuildError, BuildProgress, BuildResult, BuildSummary, OnProgress};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use tetralod::geom::lattice_box;
 use tetralod::mesh::NONE;
 use tetralod::mt::{
-    BaseMark, BaseMesh, ErrorCode, Exact, FieldInfo, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate, Patch,
-    VertexId, by_corner, further_regions,
+    BaseMark, BaseMesh, ErrorCode, Exact, FieldInfo, Forest, ForestChild, HalfEdgeBuilder, MtInfo,
+    NextUpdate, Patch, VertexId, by_corner, further_regions,
 };
 
 /// Gives what has been made of a node.
 type Of<'a, T> = &'a dyn Fn(Node) -> Result<T, PartsError>;
 
-/// Makes the MT: `left` gives what is left of every node of the plan ([`Plan::nodes`]), that of the last one twice, and `updates` those of every
-/// node, each twice. Updates are numbered coarse to fine: those of the last node first, those of the parts last, part after part.
+/// Is called when more updates have come, and may take whole blocks out of the builder.
+type OnBlocks<'a> = &'a mut dyn FnMut(&mut HalfEdgeBuilder) -> Result<(), PartsError>;
+
+/// What [`assemble_blocks`] has made.
+pub struct Assembled {
+    /// With all updates, of which blocks may have been taken.
+    #[doc(hidden)]
+    pub builder: HalfEdgeBuilder,
+    /// What is known of the MT.
+    pub summary: BuildSummary,
+    /// The MT's vertex for each reference vertex.
+    vertices: Vec<u32>,
+}
+
+/// Makes the MT: `left` gives what is left of every node of the plan ([`Plan::nodes`]), that of the last one several times, and `updates` those of
+/// every node, each twice. Updates are numbered coarse to fine: those of the last node first, those of the parts last, part after part.
 ///
 /// # Errors
 /// If what is given is not of the plan; the errors of `left` and `updates`; if `progress` stops the work.
@@ -34,22 +57,37 @@ pub fn assemble(
     updates: Of<'_, PartUpdates>,
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, PartsError> {
-    let whole = plan.nodes()[0];
-    let piece = piece_of(plan, whole, left)?;
-    if piece.points.len() != plan.counts[0] as usize {
-        return Err(PartsError::Damaged { what: "it lacks points" });
-    }
-    let (assembly, values, summary) = Assembly::begin(plan, piece, updates)?;
-    let (mt, number, depth) = assembly.append_all((left, updates), progress)?;
-    let vertices: Vec<VertexId> = number.into_iter().map(VertexId).collect();
-    let exact = exact(plan, &values, &vertices);
-    let summary = BuildSummary { depth, ..summary };
+    let scratch = InMemory::default();
+    let made = assemble_blocks(plan, (left, updates), &scratch, &mut |_| Ok(()), progress)?;
+    let Assembled { builder, summary, vertices } = made;
+    let mt = builder.finish().map_err(BuildError::from)?;
+    let vertices: Vec<VertexId> = vertices.into_iter().map(VertexId).collect();
+    let exact = exact(plan, left, &vertices)?;
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
 
-/// What is left of a node.
+/// [`assemble`], whose blocks `take` may take when they are whole; `scratch` has what is not kept in memory. Of parts it needs no more than
+/// [`Part::read_mesh`] reads.
+///
+/// # Errors
+/// As [`assemble`], and those of `take`.
+pub fn assemble_blocks(
+    plan: &Plan,
+    (left, updates): (Of<'_, Part>, Of<'_, PartUpdates>),
+    scratch: &dyn Scratch,
+    take: OnBlocks<'_>,
+    progress: OnProgress<'_>,
+) -> Result<Assembled, PartsError> {
+    let listed = Listed::read(plan, updates, scratch)?;
+    let (assembly, summary) = Assembly::begin(plan, piece_of(plan, plan.nodes()[0], left)?, listed)?;
+    let (builder, vertices) = assembly.append_all((left, updates), take, progress)?;
+    let summary = BuildSummary { depth: builder.depth(), ..summary };
+    Ok(Assembled { builder, summary, vertices })
+}
+
+/// What is left of a node, without what only joins need.
 fn piece_of(plan: &Plan, node: Node, left: Of<'_, Part>) -> Result<Piece, PartsError> {
-    let Part { head, piece } = left(node)?;
+    let Part { head, mut piece } = left(node)?;
     if head.plan != *plan || head.node != node || !head.built {
         return Err(PartsError::OtherPlan);
     }
@@ -57,6 +95,7 @@ fn piece_of(plan: &Plan, node: Node, left: Of<'_, Part>) -> Result<Piece, PartsE
     if [piece.makers.len(), piece.inner.len()] != [tets; 2] {
         return Err(PartsError::Damaged { what: "its tetrahedra lack marks" });
     }
+    piece.keep_mesh(plan.fields.len());
     Ok(piece)
 }
 
@@ -130,57 +169,95 @@ impl Span {
     }
 }
 
-/// The vertices of all updates.
-struct Listed {
+/// The updates of all nodes: what each inserts is in the scratch.
+struct Listed<'a> {
     numbers: Numbers,
-    vertices: Vec<u32>,
-    near: Vec<u32>,
+    nodes: Vec<(Node, u32)>,
+    scratch: &'a dyn Scratch,
 }
 
-impl Listed {
-    fn read(
-        plan: &Plan,
-        updates: &dyn Fn(Node) -> Result<PartUpdates, PartsError>,
-    ) -> Result<Self, PartsError> {
-        let mut of_nodes = Vec::new();
+/// Bytes of what the scratch has of an update: the reference vertex that it inserts, the one near to it, and how far that is.
+const LISTED: usize = 20;
+
+/// So many updates are read at a time.
+const AT_A_TIME: u32 = 1 << 16;
+
+/// The name under which they are kept.
+const UPDATES: &str = "updates";
+
+impl<'a> Listed<'a> {
+    fn read(plan: &Plan, updates: Of<'_, PartUpdates>, scratch: &'a dyn Scratch) -> Result<Self, PartsError> {
+        let mut nodes = Vec::new();
+        scratch.write(UPDATES, &[])?;
         for node in plan.nodes() {
-            let PartUpdates { head, rows: UpdateRows { vertices, near, .. } } = updates(node)?;
+            let PartUpdates { head, rows: UpdateRows { vertices, near, offsets, .. } } = updates(node)?;
             if head.plan != *plan || head.node != node {
                 return Err(PartsError::OtherPlan);
             }
-            of_nodes.push((node, vertices, near));
-        }
-        let counts: Vec<(Node, u32)> =
-            of_nodes.iter().map(|(node, vertices, _)| (*node, vertices.len() as u32)).collect();
-        let numbers = Numbers::new(&counts, plan.block_bits);
-        let all = counts.iter().map(|(_, count)| *count as usize).sum();
-        let (mut vertices, mut near) = (vec![NONE; all], vec![NONE; all]);
-        for (node, own_vertices, own_near) in of_nodes {
-            let span = numbers.span(node)?;
-            for (u, (vertex, near_vertex)) in (0..).zip(own_vertices.into_iter().zip(own_near)) {
-                let u = span.of(u) as usize;
-                (vertices[u], near[u]) = (vertex, near_vertex);
+            let mut bytes = Vec::with_capacity(LISTED * vertices.len());
+            for ((vertex, near), [x, y, z]) in vertices.iter().zip(near).zip(offsets) {
+                let numbers = [*vertex, near, x as u32, y as u32, z as u32];
+                numbers.iter().for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
             }
+            scratch.append(UPDATES, &bytes)?;
+            nodes.push((node, vertices.len() as u32));
         }
-        Ok(Self { numbers, vertices, near })
+        Ok(Self { numbers: Numbers::new(&nodes, plan.block_bits), nodes, scratch })
     }
 
-    /// Checks that each point is in the base mesh or is inserted, by one update and next to a vertex that is there.
-    fn check(&self, base: &Numbered) -> Result<(), PartsError> {
-        let mut when: Vec<u32> = base.number.iter().map(|&v| if v == NONE { NONE } else { 0 }).collect();
-        for (u, (&vertex, &near)) in (1..).zip(self.vertices.iter().zip(&self.near)) {
-            let is_there = when.get(near as usize).is_some_and(|&when| when < u);
-            match when.get_mut(vertex as usize) {
-                Some(when) if *when == NONE && is_there => *when = u,
-                _ => return Err(PartsError::Damaged { what: "its updates are those of other points" }),
+    /// How many updates there are.
+    fn len(&self) -> u32 {
+        self.nodes.iter().map(|(_, count)| count).sum()
+    }
+
+    /// Passes on each update: its number, the two reference vertices, and how far one is from the other.
+    fn each(
+        &self,
+        mut pass: impl FnMut(u32, [u32; 2], [i32; 3]) -> Result<(), PartsError>,
+    ) -> Result<(), PartsError> {
+        let mut at = 0;
+        for &(node, count) in &self.nodes {
+            let span = self.numbers.span(node)?;
+            for first in (0..count).step_by(AT_A_TIME as usize) {
+                let some = AT_A_TIME.min(count - first);
+                let bytes = self.scratch.read_at(UPDATES, at, LISTED * some as usize)?;
+                at += bytes.len() as u64;
+                let (words, _) = bytes.as_chunks::<4>();
+                let (rows, _) = words.as_chunks::<{ LISTED / 4 }>();
+                for (update, row) in (first..).zip(rows) {
+                    let [vertex, near, x, y, z] = row.map(u32::from_le_bytes);
+                    pass(span.of(update), [vertex, near], [x, y, z].map(|d| d as i32))?;
+                }
             }
-        }
-        if when.contains(&NONE) {
-            return Err(PartsError::Damaged { what: "updates are missing" });
         }
         Ok(())
     }
+
+    /// Enters the MT's vertex for each reference vertex, given those of so many base vertices, and sorts the updates by their near vertices. Each
+    /// point must be in the base mesh or be inserted, by one update and next to a vertex that is there.
+    fn number(&self, number: &mut [u32], base: u32) -> Result<Children<'a>, PartsError> {
+        self.each(|update, [vertex, _], _| match number.get_mut(vertex as usize) {
+            Some(number) if *number == NONE => {
+                *number = base + update;
+                Ok(())
+            }
+            _ => Err(PartsError::Damaged { what: OTHER_POINTS }),
+        })?;
+        if number.contains(&NONE) {
+            return Err(PartsError::Damaged { what: "updates are missing" });
+        }
+        let mut sorter = ChildSorter::new(self.scratch, base + self.len());
+        self.each(|update, [_, near], offset| match number.get(near as usize) {
+            Some(&near) if near < base + update => Ok(sorter.put(near, ForestChild { update, offset })?),
+            _ => Err(PartsError::Damaged { what: OTHER_POINTS }),
+        })?;
+        self.scratch.remove(UPDATES)?;
+        Ok(sorter.finish()?)
+    }
 }
+
+/// What is wrong where updates do not go with the points.
+const OTHER_POINTS: &str = "its updates are those of other points";
 
 /// Reference vertices with their levels: vertex by vertex and field by field, and behind these those of their sides.
 struct Vertices {
@@ -219,57 +296,66 @@ struct Assembly<'a> {
     /// The MT's vertex for each reference vertex.
     number: Vec<u32>,
     numbers: Numbers,
-    /// For each update the longest chain of updates that leads to it.
-    depths: Vec<u32>,
+    children: Children<'a>,
     done: usize,
 }
 
 impl<'a> Assembly<'a> {
-    /// With the base mesh, which is what is left of the whole. Returns the exact values, if some are to be kept, and what is known of the MT.
+    /// With the base mesh, which is what is left of the whole. Returns what is known of the MT, too.
     fn begin(
         plan: &'a Plan,
         mut piece: Piece,
-        updates: Of<'_, PartUpdates>,
-    ) -> Result<(Self, Vec<f64>, BuildSummary), PartsError> {
-        let listed = Listed::read(plan, updates)?;
+        listed: Listed<'a>,
+    ) -> Result<(Self, BuildSummary), PartsError> {
         let mut info = plan.info();
-        info.updates = listed.vertices.len() as u32;
-        info.bounds = lattice_box(piece.positions.iter().copied());
+        info.updates = listed.len();
+        info.bounds = Some([[0; 3], plan.sides]);
         let vertices = Vertices::of(plan, &info, &mut piece);
         let numbered = number_base(&piece.positions, &vertices.levels, info.fields.len(), &piece.tets);
         let summary = BuildSummary::of(&info, &numbered.mesh, 0);
-        listed.check(&numbered)?;
+        let base = numbered.mesh.positions.len() as u32;
+        let mut number = vec![NONE; plan.counts[0] as usize];
+        for (&point, &v) in piece.points.iter().zip(&numbered.number) {
+            number[point as usize] = v;
+        }
+        let children = listed.number(&mut number, base)?;
         let mut base_marks = Vec::with_capacity(piece.tets.len());
         for (&maker, &inner) in piece.makers.iter().zip(&piece.inner) {
             base_marks.push((listed.numbers.of_maker(maker, &piece)?, inner));
         }
-        let ordered = Ordered { vertices: &listed.vertices, near: &listed.near, base_marks: &base_marks };
-        let points = (&piece.positions[..], &vertices.levels[..], &vertices.sides);
+        let labels: Vec<u32> = (0..base).collect();
+        let (starts, of_base) = children.of(&labels)?;
+        let places = append::points_of(&numbered);
+        let names: Vec<u32> = places.iter().map(|&at| piece.points[at as usize]).collect();
+        let forest = Forest::of(&labels, names.clone(), starts, of_base);
         let unknown = PartsError::Damaged { what: OTHER_REGIONS };
         let regions = plan.regions.as_ref().map(|regions| regions.of_base(&piece.regions).ok_or(unknown));
         let described = (info.clone(), regions.transpose()?);
-        let (builder, number) = append::begin(described, numbered, &ordered, points, plan.block_bits)?;
-        let depths = vec![1; listed.vertices.len()];
-        let is_lossless = plan.fields.iter().any(|field| field.lossless);
-        let values = if is_lossless { piece.values } else { Vec::new() };
-        Ok((Self { plan, info, builder, number, numbers: listed.numbers, depths, done: 0 }, values, summary))
+        let points = (&vertices.levels[..], &vertices.sides);
+        let base = (&numbered, [&places[..], &names]);
+        let builder = append::begin(described, base, &base_marks, points, forest, plan.block_bits)?;
+        let numbers = listed.numbers;
+        Ok((Self { plan, info, builder, number, numbers, children, done: 0 }, summary))
     }
 
-    /// Returns the MT, its vertex for each reference vertex, and the length of the longest chain of updates.
+    /// Returns the builder with all updates, and the MT's vertex for each reference vertex.
     fn append_all(
         mut self,
         (left, updates): (Of<'_, Part>, Of<'_, PartUpdates>),
+        take: OnBlocks<'_>,
         progress: OnProgress<'_>,
-    ) -> Result<(HalfEdgeMt, Vec<u32>, u32), PartsError> {
+    ) -> Result<(HalfEdgeBuilder, Vec<u32>), PartsError> {
         for level in self.plan.nodes().chunk_by(|a, b| a.level == b.level) {
             for &node in level {
                 let piece = piece_of(self.plan, node, left)?;
                 self.append_node(node, piece, updates(node)?.rows, progress)?;
+                take(&mut self.builder)?;
             }
             self.builder.append_waiting().map_err(BuildError::from)?;
+            take(&mut self.builder)?;
         }
-        let depth = self.depths.into_iter().max().unwrap_or(0);
-        Ok((self.builder.finish().map_err(BuildError::from)?, self.number, depth))
+        self.children.remove()?;
+        Ok((self.builder, self.number))
     }
 
     /// Appends the updates of a node to what is left of it: those that are left over from blocks come behind those of the other nodes of its level.
@@ -285,10 +371,10 @@ impl<'a> Assembly<'a> {
             return Err(PartsError::OtherPlan);
         }
         let vertices = Vertices::of(self.plan, &self.info, &mut piece);
-        let patch = self.patch(&piece, &vertices)?;
-        self.builder.start_patch(&patch).map_err(BuildError::from)?;
-        drop(patch);
-        let reference = (&piece.points[..], &vertices);
+        let patch = self.patch(&piece, &vertices, &rows.vertices)?;
+        self.builder.start_patch(patch).map_err(BuildError::from)?;
+        let Piece { points, .. } = piece;
+        let reference = (&points[..], &vertices);
         let (in_blocks, left_over) = rows.split(in_blocks as usize, self.info.fields.len());
         self.append(node, first, &in_blocks, reference, progress)?;
         if !left_over.vertices.is_empty() {
@@ -299,8 +385,20 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// What is left of a node, as the MT knows it.
-    fn patch(&self, piece: &Piece, vertices: &Vertices) -> Result<Patch, PartsError> {
+    /// The forest of a patch: of its vertices and of those that are inserted into it, all of which are reference vertices.
+    fn forest(&self, vertices: impl Iterator<Item = u32>) -> Result<Forest, PartsError> {
+        let number = |point: u32| self.number.get(point as usize).map(|&number| (number, point));
+        let named: Option<Vec<(u32, u32)>> = vertices.map(number).collect();
+        let mut named = named.ok_or(PartsError::Damaged { what: OTHER_POINTS })?;
+        named.sort_unstable();
+        named.dedup();
+        let (labels, names): (Vec<u32>, Vec<u32>) = named.into_iter().unzip();
+        let (starts, children) = self.children.of(&labels)?;
+        Ok(Forest::of(&labels, names, starts, children))
+    }
+
+    /// What is left of a node, as the MT knows it; `inserted` are the reference vertices of the node's updates.
+    fn patch(&self, piece: &Piece, vertices: &Vertices, inserted: &[u32]) -> Result<Patch, PartsError> {
         let fields = self.info.fields.len();
         let mut used: Vec<u32> = piece.tets.iter().flatten().copied().collect();
         used.sort_unstable();
@@ -330,9 +428,18 @@ impl<'a> Assembly<'a> {
             let further = further_regions(used.len(), &tets, &regions).into_iter();
             side_levels = further.flat_map(|(v, region)| at(used[v as usize], region)).copied().collect();
         }
+        let forest =
+            self.forest(used.iter().map(|&v| piece.points[v as usize]).chain(inserted.iter().copied()))?;
         let positions = used.iter().map(|&v| piece.positions[v as usize]).collect();
         let vertices = used.iter().map(|&v| self.number[piece.points[v as usize] as usize]).collect();
-        Ok(Patch { mesh: BaseMesh { positions, values, tets }, vertices, marks, regions, side_levels })
+        Ok(Patch {
+            mesh: BaseMesh { positions, values, tets },
+            vertices,
+            forest,
+            marks,
+            regions,
+            side_levels,
+        })
     }
 
     /// Appends updates of a node, numbered from `first` on, given its reference vertices, which ascend.
@@ -344,28 +451,27 @@ impl<'a> Assembly<'a> {
         (points, vertices): (&[u32], &Vertices),
         progress: OnProgress<'_>,
     ) -> Result<(), PartsError> {
-        let Self { builder, numbers, depths, done, info, .. } = self;
+        let Self { builder, number: vertex_of, numbers, done, info, .. } = self;
         let earlier = rows.earlier.iter().map(|&made| numbers.of(made)).collect::<Result<Vec<u32>, _>>()?;
         let (own, fields) = (numbers.span(node)?, info.fields.len());
         let mut star = 0;
         for (i, (number, errors)) in (first as usize..).zip(rows.errors.chunks(fields)).enumerate() {
-            BuildProgress::tell_ordered(*done, depths.len(), progress)?;
+            BuildProgress::tell_ordered(*done, info.updates as usize, progress)?;
             let inserted: Range<usize> = star..star + usize::from(rows.stars[i]);
             let removers = rows.removers[inserted.clone()].iter().map(|&code| remover(code, own, &earlier));
-            for below in removers.clone().filter(|&remover| remover != NONE) {
-                let depth = depths[number] + 1;
-                match depths.get_mut(below as usize) {
-                    Some(of_child) if below as usize > number => *of_child = (*of_child).max(depth),
-                    _ => return Err(PartsError::Damaged { what: "its updates are out of order" }),
-                }
+            if removers.clone().any(|remover| remover as usize <= number) {
+                return Err(PartsError::Damaged { what: "its updates are out of order" });
             }
             let errors: Vec<ErrorCode> = errors.iter().copied().map(ErrorCode).collect();
             let inner = rows.inner[inserted.clone()].iter().copied();
-            let unknown = PartsError::Damaged { what: "its updates are those of other points" };
+            let unknown = PartsError::Damaged { what: OTHER_POINTS };
             let vertex = points.binary_search(&rows.vertices[i]).map_err(|_| unknown)? as u32;
             let sides = vertices.further(vertex, fields);
             let levels = vertices.levels(vertex, fields);
-            let next = NextUpdate { levels, sides: &sides, errors: &errors, faces: &[] };
+            // That there is one has been checked.
+            let near = vertex_of.get(rows.near[i] as usize).copied().unwrap_or(NONE);
+            let offset = rows.offsets[i];
+            let next = NextUpdate { near, offset, levels, sides: &sides, errors: &errors, faces: &[] };
             builder.push(&next, removers.zip(inner)).map_err(BuildError::from)?;
             star = inserted.end;
             *done += 1;
@@ -384,20 +490,25 @@ fn remover(code: RemoverCode, own: Span, earlier: &[u32]) -> u32 {
 }
 
 /// The exact values of the lossless fields.
-fn exact(plan: &Plan, values: &[f64], vertices: &[VertexId]) -> Vec<Exact> {
+fn exact(plan: &Plan, left: Of<'_, Part>, vertices: &[VertexId]) -> Result<Vec<Exact>, PartsError> {
+    if !plan.keeps_exact_values() {
+        return Ok(Vec::new());
+    }
+    let Part { piece: Piece { points, values, .. }, .. } = left(plan.nodes()[0])?;
+    if points.len() != vertices.len() {
+        return Err(PartsError::Damaged { what: "it lacks points" });
+    }
     let fields = plan.fields.len();
-    let lossless = (0..fields).filter(|&f| plan.fields[f].lossless);
     let of = |f: usize| {
-        let own = values.iter().skip(f).step_by(fields).copied();
-        Exact::new(f, vertices.iter().copied().zip(own).collect())
+        let own = points.iter().map(|&point| vertices[point as usize]);
+        Exact::new(f, own.zip(values.iter().skip(f).step_by(fields).copied()).collect())
     };
-    lossless.map(of).collect()
+    Ok((0..fields).filter(|&f| plan.fields[f].lossless).map(of).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tetralod::mt::BaseMesh;
 
     #[test]
     fn every_update_has_one_number_and_nodes_begin_with_blocks() {
@@ -423,11 +534,13 @@ mod tests {
     #[test]
     fn points_are_inserted_once_each_and_next_to_one_that_is_there() {
         // Points 0 and 1 are in the base mesh.
-        let base =
-            || Numbered { mesh: BaseMesh::default(), number: vec![0, 1, NONE, NONE], places: Vec::new() };
         let check = |vertices: [u32; 2], near: [u32; 2]| {
-            Listed { numbers: Numbers::new(&[], 4), vertices: vertices.to_vec(), near: near.to_vec() }
-                .check(&base())
+            let nodes = vec![(Node { level: 0, index: 0 }, 2)];
+            let scratch = InMemory::default();
+            let rows = [vertices[0], near[0], 0, 0, 0, vertices[1], near[1], 0, 0, 0];
+            scratch.write(UPDATES, &rows.map(u32::to_le_bytes).concat()).expect("room");
+            let listed = Listed { numbers: Numbers::new(&nodes, 4), nodes, scratch: &scratch };
+            listed.number(&mut [0, 1, NONE, NONE], 2).map(drop)
         };
         assert!(check([2, 3], [0, 2]).is_ok());
         assert!(check([3, 2], [1, 3]).is_ok());

@@ -291,8 +291,11 @@ fn sorted_out(
     };
     for &c in &order {
         let Collapse { vertex, errors, star: (makers, inner) } = record.get(c);
+        let near = record.near(c);
         rows.vertices.push(piece.points[vertex as usize]);
-        rows.near.push(piece.points[record.near(c) as usize]);
+        rows.near.push(piece.points[near as usize]);
+        let [from, to] = [near, vertex].map(|v| piece.positions[v as usize]);
+        rows.offsets.push([0, 1, 2].map(|k| to[k] - from[k]));
         rows.errors.extend(errors.iter().map(|error| error.0));
         rows.stars.push(makers.len() as u8);
         rows.removers.extend(makers.iter().map(|&maker| RemoverCode::from(remover(maker))));
@@ -319,6 +322,6 @@ fn sorted_out(
     piece.inner = marks.iter().map(|(_, inner)| *inner).collect();
     piece.earlier = earlier;
     piece.carried.earlier_errors = earlier_errors;
-    drop(record);
-    (Part { head: head.clone(), piece: numbering::ascending(piece) }, PartUpdates { head, rows })
+    piece.vertices = vertices;
+    (Part { head: head.clone(), piece }, PartUpdates { head, rows })
 }

@@ -2,7 +2,7 @@
 //!
 //! Most of them are no vertices of its mesh any more, and only in buckets. These come last, so that what only vertices need is kept for
 //! vertices alone; and before them what only the boundary of the reference mesh needs. Points of each kind ascend by their numbers in
-//! the whole, as all of them do in files.
+//! the whole.
 //!
 //! ```text
 //!     | vertices of the mesh | others on the boundary | all others     |
@@ -91,63 +91,33 @@ fn number_vertices_first(points: &mut Vec<u32>, pieces: &[Piece], numbers: &mut 
     counts[0] as usize
 }
 
-/// The piece with its points in the order of files.
-pub(super) fn ascending(mut piece: Piece) -> Piece {
-    if piece.points.is_sorted() {
-        return piece;
-    }
-    let points = piece.points.len();
-    let mut order: Vec<u32> = (0..points as u32).collect();
-    order.sort_by_key(|&v| piece.points[v as usize]);
-    let mut number = vec![0; points + piece.sided.further.len()];
-    (0..).zip(&order).for_each(|(i, &v)| number[v as usize] = i);
-    sort_by(&order, 1, &mut piece.points);
-    sort_by(&order, 1, &mut piece.positions);
-    sort_by(&order, piece.values.len() / points, &mut piece.values);
-    sort_by(&order, 1, &mut piece.carried.shortest);
-    sort_by(&order, 1, &mut piece.sided.first);
-    drop(order);
-    sort_sides(&mut piece.sided, &mut number);
-    let new = |v: &mut u32| *v = number[*v as usize];
-    piece.tets.iter_mut().flatten().for_each(new);
-    let carried = &mut piece.carried;
-    let buckets = [&mut carried.inside, &mut carried.border, &mut carried.foreign];
-    buckets.into_iter().flatten().for_each(|(v, _)| new(v));
-    carried.outside.iter_mut().for_each(new);
-    carried.outside.sort_unstable();
-    carried.moved.iter_mut().for_each(|(v, _)| new(v));
-    carried.moved.sort_unstable_by_key(|(v, _)| *v);
-    carried.shared.iter_mut().for_each(|(v, ..)| new(v));
-    carried.shared.sort_unstable();
-    carried.interface.iter_mut().flat_map(|(face, _)| face).for_each(new);
-    carried.boundary.iter_mut().flatten().for_each(new);
-    carried.kept.iter_mut().for_each(new);
-    carried.kept.sort_unstable();
-    carried.reaches.iter_mut().for_each(|(v, _)| new(v));
-    piece
-}
+#[cfg(test)]
+mod tests {
+    use super::super::{build_part, part};
+    use super::*;
+    use crate::BuildConfig;
+    use std::collections::BTreeMap;
+    use std::ops::ControlFlow;
+    use tetralod::mesh::{Field, Grid, TetMesh};
 
-/// Puts what each point has so many of into another order; nothing where points have none.
-fn sort_by<T: Copy>(order: &[u32], each: usize, all: &mut Vec<T>) {
-    if !all.is_empty() {
-        let mut sorted = Vec::with_capacity(all.len());
-        order.iter().for_each(|&v| sorted.extend_from_slice(&all[v as usize * each..][..each]));
-        *all = sorted;
+    #[test]
+    fn vertices_come_first_and_points_keep_what_they_have() {
+        let grid = Grid { dims: [9; 3], origin: [0.0; 3], spacing: [1.0; 3] };
+        let values = (0..9_u32.pow(3)).map(f64::from).collect();
+        let mesh = TetMesh::from_grid(grid, vec![Field::new("its number", values)]);
+        let mut pieces = Vec::new();
+        let put = &mut |of| {
+            pieces.push(build_part(of, &mut |_| ControlFlow::Continue(()))?.0.piece);
+            Ok(())
+        };
+        let config = BuildConfig::default();
+        let plan = part(&mesh, &config, 2, BTreeMap::new(), put).expect("a mesh that can be parted");
+        let (piece, vertices) = joined(&plan, Node { level: 1, index: 0 }, pieces);
+        assert!(piece.tets.iter().flatten().all(|&v| (v as usize) < vertices));
+        assert!(piece.points[..vertices].is_sorted() && !piece.points.is_sorted());
+        let mut numbers = piece.points.clone();
+        assert_eq!(piece.values, numbers.iter().copied().map(f64::from).collect::<Vec<f64>>());
+        numbers.sort_unstable();
+        assert_eq!(numbers, (0..9_u32.pow(3)).collect::<Vec<u32>>());
     }
-}
-
-/// Sorts sides by the new numbers of their points, behind which it adds theirs.
-fn sort_sides(sided: &mut Sided, number: &mut [u32]) {
-    if sided.further.is_empty() {
-        return;
-    }
-    let points = number.len() - sided.further.len();
-    let new = |(i, &(v, region)): (u32, &(u32, u32))| (number[v as usize], region, i);
-    let mut order: Vec<(u32, u32, u32)> = (0..).zip(&sided.further).map(new).collect();
-    order.sort_unstable();
-    (points as u32..).zip(&order).for_each(|(at, &(.., i))| number[points + i as usize] = at);
-    let each = sided.values.len() / sided.further.len();
-    sided.further = order.iter().map(|&(v, region, _)| (v, region)).collect();
-    let order: Vec<u32> = order.into_iter().map(|(.., i)| i).collect();
-    sort_by(&order, each, &mut sided.values);
 }

@@ -45,7 +45,8 @@ pub(super) struct Made {
 /// A mesh, what its vertices were, and where they are now. Points and tetrahedra are numbers of this piece unless it says otherwise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Piece {
-    /// The reference vertex of the whole for each point, ascending.
+    /// The reference vertex of the whole for each point: those of the mesh that the piece was before it was built, ascending, then all
+    /// others, which are in buckets.
     pub points: Vec<u32>,
     /// On the lattice of the whole.
     pub positions: Vec<[i32; 3]>,
@@ -62,10 +63,39 @@ pub(super) struct Piece {
     pub regions: Vec<u32>,
     /// Where fields jump between regions.
     pub sided: Sided,
+    /// How many points those of the mesh are. All others, with what they have, are in a frame of their own.
+    #[serde(skip)]
+    pub vertices: usize,
     /// In a frame of its own.
     #[serde(skip)]
     pub carried: Carried,
 }
+
+/// What assembling needs of a piece, as it is written: read as a [`Piece`].
+#[derive(Serialize)]
+struct MeshFrame<'a> {
+    points: &'a [u32],
+    positions: &'a [[i32; 3]],
+    values: &'a [f64],
+    tets: &'a [[u32; 4]],
+    makers: &'a [u32],
+    inner: &'a [u8],
+    earlier: &'a [Made],
+    regions: &'a [u32],
+    sided: SidedFrame<'a>,
+}
+
+/// [`Sided`], as it is written.
+#[derive(Serialize)]
+struct SidedFrame<'a> {
+    first: &'a [u32],
+    further: &'a [(u32, u32)],
+    values: &'a [f64],
+}
+
+/// The points of a piece that are not of its mesh, as they are written: read as [`OtherPoints`].
+type OtherPointsFrame<'a> = (&'a [u32], &'a [[i32; 3]], &'a [f64], SidedFrame<'a>);
+type OtherPoints = (Vec<u32>, Vec<[i32; 3]>, Vec<f64>, Sided);
 
 /// What a piece needs to be simplified further, and assembling does not.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -113,8 +143,9 @@ const LACKS_VALUES: &str = "its points lack values";
 pub(super) struct UpdateRows {
     /// The reference vertex that each inserts.
     pub vertices: Vec<u32>,
-    /// The reference vertex near to it.
+    /// The reference vertex near to it, and how far from there it is.
     pub near: Vec<u32>,
+    pub offsets: Vec<[i32; 3]>,
     /// Field by field.
     pub errors: Vec<u16>,
     /// How many tetrahedra each inserts.
@@ -199,7 +230,53 @@ impl Sided {
     }
 }
 
+/// What some have of each, of so many, and what the others have; nothing if there is nothing.
+fn parted<T>(all: &[T], some: usize, of: usize) -> (&[T], &[T]) {
+    all.split_at(all.len() / of.max(1) * some)
+}
+
 impl Piece {
+    /// As it is written.
+    fn frames(&self) -> (MeshFrame<'_>, OtherPointsFrame<'_>) {
+        let (vertices, all) = (self.vertices, self.points.len());
+        let (points, other_points) = self.points.split_at(vertices);
+        let (positions, other_positions) = self.positions.split_at(vertices);
+        let (values, other_values) = parted(&self.values, vertices, all);
+        let Sided { first, further, values: of_sides } = &self.sided;
+        let (first, other_first) = parted(first, vertices, all);
+        let sides = further.partition_point(|(v, _)| (*v as usize) < vertices);
+        let (of_sides, other_of_sides) = parted(of_sides, sides, further.len());
+        let (further, other_further) = further.split_at(sides);
+        let sided = SidedFrame { first, further, values: of_sides };
+        let others = SidedFrame { first: other_first, further: other_further, values: other_of_sides };
+        let Self { tets, makers, inner, earlier, regions, .. } = self;
+        let mesh = MeshFrame { points, positions, values, tets, makers, inner, earlier, regions, sided };
+        (mesh, (other_points, other_positions, other_values, others))
+    }
+
+    /// Adds the other points.
+    fn extend(&mut self, (points, positions, values, sided): OtherPoints) {
+        self.points.extend(points);
+        self.positions.extend(positions);
+        self.values.extend(values);
+        self.sided.first.extend(sided.first);
+        self.sided.further.extend(sided.further);
+        self.sided.values.extend(sided.values);
+    }
+
+    /// Leaves the points of the mesh alone, as if no others had been read.
+    pub fn keep_mesh(&mut self, fields: usize) {
+        let vertices = self.vertices;
+        self.points.truncate(vertices);
+        self.positions.truncate(vertices);
+        self.values.truncate(vertices * fields);
+        self.sided.first.truncate(vertices);
+        let sides = self.sided.further.partition_point(|(v, _)| (*v as usize) < vertices);
+        self.sided.further.truncate(sides);
+        self.sided.values.truncate(sides * fields);
+        self.carried = Carried::default();
+    }
+
     /// The points of several pieces, each once, which are to be [put](Self::put) there.
     pub fn over<'p>(pieces: impl Iterator<Item = &'p Vec<u32>>, fields: usize) -> Self {
         let mut points: Vec<u32> = pieces.flatten().copied().collect();
@@ -212,10 +289,13 @@ impl Piece {
         Self { points, positions, values, carried, ..Self::default() }
     }
 
-    /// Where these points are here; both ascend.
+    /// Where these points are here, where they ascend; these mostly do.
     pub fn places(&self, points: &[u32]) -> Vec<u32> {
         let mut at = 0;
         let place = |&point: &u32| {
+            if self.points.get(at).is_some_and(|&last| point < last) {
+                at = 0;
+            }
             at += self.points[at..].partition_point(|&other| other < point);
             at as u32
         };
@@ -241,6 +321,7 @@ impl UpdateRows {
         let rest = Self {
             vertices: self.vertices.split_off(count),
             near: self.near.split_off(count),
+            offsets: self.offsets.split_off(count),
             errors: self.errors.split_off(count * fields),
             stars: self.stars.split_off(count),
             removers: self.removers.split_off(star),
@@ -265,7 +346,8 @@ impl Plan {
 
 impl Part {
     /// A part of the reference mesh.
-    pub(super) fn of(plan: &Plan, index: u32, piece: Piece) -> Self {
+    pub(super) fn of(plan: &Plan, index: u32, mut piece: Piece) -> Self {
+        piece.vertices = piece.points.len();
         Self { head: Head { plan: plan.clone(), node: Node { level: 0, index }, built: false }, piece }
     }
 
@@ -301,7 +383,9 @@ impl Part {
     }
 
     fn write_piece(&self, out: &mut dyn Write) -> Result<(), PartsError> {
-        write_frame(out, &self.piece)?;
+        let (mesh, others) = self.piece.frames();
+        write_frame(out, &mesh)?;
+        write_frame(out, &others)?;
         write_frame(out, &self.piece.carried)
     }
 
@@ -310,9 +394,10 @@ impl Part {
     /// # Errors
     /// If `input` fails, or holds no whole and sound part.
     pub fn read<R: Read + Seek>(input: &mut R) -> Result<Self, PartsError> {
-        let mut part = Self::read_mesh(input)?;
+        let mut part = Self::read_first(input)?;
+        part.piece.extend(read_numbers(input)?);
         part.piece.carried = read_numbers(input)?;
-        part.check_carried().map_err(|what| PartsError::Damaged { what })?;
+        part.check().and_then(|()| part.check_carried()).map_err(|what| PartsError::Damaged { what })?;
         Ok(part)
     }
 
@@ -321,15 +406,21 @@ impl Part {
     /// # Errors
     /// As [`Part::read`], but for what is not read.
     pub fn read_mesh<R: Read + Seek>(input: &mut R) -> Result<Self, PartsError> {
+        let part = Self::read_first(input)?;
+        part.check().map_err(|what| PartsError::Damaged { what })?;
+        Ok(part)
+    }
+
+    /// Reads up to the points of the mesh.
+    fn read_first<R: Read + Seek>(input: &mut R) -> Result<Self, PartsError> {
         read_magic(input)?;
         let head: Head = read_frame(input)?;
         if head.built {
             skip_frame(input)?;
         }
-        let piece: Piece = read_numbers(input)?;
-        let part = Self { head, piece };
-        part.check().map_err(|what| PartsError::Damaged { what })?;
-        Ok(part)
+        let mut piece: Piece = read_numbers(input)?;
+        piece.vertices = piece.points.len();
+        Ok(Self { head, piece })
     }
 
     /// Reads what a part that has been built is of, and checks that it is as long as it says; the rest of it is not read.
@@ -342,9 +433,7 @@ impl Part {
         if !built {
             return Err(PartsError::Damaged { what: "it has not been built" });
         }
-        skip_frame(input)?;
-        skip_frame(input)?;
-        skip_frame(input)?;
+        (0..4).try_for_each(|_| skip_frame(input))?;
         let end = input.stream_position()?;
         if input.seek(SeekFrom::End(0))? == end {
             Ok((plan, node))
@@ -358,16 +447,18 @@ impl Part {
         let Self { head: Head { plan, node, .. }, piece } = self;
         let (points, fields) = (piece.points.len(), plan.fields.len());
         expect(plan.has(*node) && fields > 0, "it is not of its plan")?;
-        let rising = piece.points.windows(2).all(|pair| pair[0] < pair[1]);
-        let known = piece.points.last().is_none_or(|&last| last < plan.counts[0]);
-        expect(rising && known, "its points are others")?;
+        let rise = |points: &[u32]| points.windows(2).all(|pair| pair[0] < pair[1]);
+        let mut sorted = piece.points.clone();
+        sorted.sort_unstable();
+        let known = sorted.last().is_none_or(|&last| last < plan.counts[0]);
+        expect(known && rise(&sorted) && rise(&piece.points[..piece.vertices]), "its points are others")?;
         let side = 1_i32.checked_shl(plan.lattice.2).filter(|_| plan.lattice.2 <= 30).unwrap_or(0);
         let is_on = |p: &[i32; 3]| p.iter().all(|x| (0..=side).contains(x));
         let are_finite = piece.values.iter().all(|x| x.is_finite());
         let lengths = [piece.positions.len(), piece.values.len() / fields];
         expect(lengths == [points; 2] && piece.values.len() == points * fields, LACKS_VALUES)?;
         expect(are_finite && piece.positions.iter().all(is_on), "its points are off the lattice")?;
-        let at = |v: u32| piece.positions.get(v as usize);
+        let at = |v: u32| piece.positions[..piece.vertices].get(v as usize);
         let is_positive = |&[a, b, c, d]: &[u32; 4]| {
             let all = at(a).zip(at(b)).zip(at(c).zip(at(d)));
             all.is_some_and(|((&a, &b), (&c, &d))| orient3d(a, b, c, d) > 0)
@@ -456,8 +547,8 @@ impl PartUpdates {
         let Self { head: Head { plan, node, .. }, rows } = self;
         let (count, fields) = (rows.vertices.len(), plan.fields.len());
         expect(plan.has(*node) && fields > 0, "it is not of its plan")?;
-        let lengths = [rows.near.len(), rows.stars.len(), rows.errors.len() / fields];
-        expect(lengths == [count; 3] && rows.errors.len() == count * fields, "its updates lack parts")?;
+        let lengths = [rows.near.len(), rows.offsets.len(), rows.stars.len(), rows.errors.len() / fields];
+        expect(lengths == [count; 4] && rows.errors.len() == count * fields, "its updates lack parts")?;
         let inserted: usize = rows.stars.iter().map(|&star| usize::from(star)).sum();
         expect([rows.removers.len(), rows.inner.len()] == [inserted; 2], "its updates lack tetrahedra")?;
         let known = |&v: &u32| v < plan.counts[0];

@@ -10,6 +10,7 @@ use super::partition::{between, shared_faces};
 use super::piece::Part;
 use super::plan::{Plan, purpose};
 use super::prepared::{Prepared, Stored, Whole, places};
+use super::scratch::Scratch;
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
 use crate::lattice::position_lattice;
@@ -19,38 +20,16 @@ use crate::{BuildConfig, BuildError, Purpose};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io;
 use tetralod::geom::{Bounds, Lattice, WIDE_BITS, bits_of};
 use tetralod::mesh::{BitSet, Extremes, FACES, Field, MAX_TETS, MOST_LABELS, MeshInput, MeshPiece, TetMesh};
 use tetralod::mt::MAX_UPDATES;
-
-/// Where [`Piecewise`] puts what it does not keep in memory, by names of letters, digits and dashes.
-pub trait Scratch {
-    /// Keeps bytes under a name.
-    ///
-    /// # Errors
-    /// If they cannot be kept.
-    fn write(&mut self, name: &str, bytes: &[u8]) -> io::Result<()>;
-
-    /// The bytes of a name.
-    ///
-    /// # Errors
-    /// If they cannot be read.
-    fn read(&self, name: &str) -> io::Result<Vec<u8>>;
-
-    /// Forgets a name.
-    ///
-    /// # Errors
-    /// If that fails.
-    fn remove(&mut self, name: &str) -> io::Result<()>;
-}
 
 /// A mesh that is parted piece by piece.
 pub struct Piecewise<'a> {
     config: &'a BuildConfig,
     purpose: Purpose,
     parts: u32,
-    scratch: &'a mut dyn Scratch,
+    scratch: &'a dyn Scratch,
     pieces: u32,
     sums: Sums,
 }
@@ -91,11 +70,7 @@ impl<'a> Piecewise<'a> {
     /// # Errors
     /// If `config` is not of half-edge MTs, or there is no such number of parts; [`PartsError::NeedsWhole`] if it asks for what only a whole
     /// mesh tells.
-    pub fn new(
-        config: &'a BuildConfig,
-        parts: u32,
-        scratch: &'a mut dyn Scratch,
-    ) -> Result<Self, PartsError> {
+    pub fn new(config: &'a BuildConfig, parts: u32, scratch: &'a dyn Scratch) -> Result<Self, PartsError> {
         let purpose = purpose(config, parts)?;
         if !config.preserve.is_empty() || !config.keep_points.is_empty() {
             return whole("regions and single points are kept");

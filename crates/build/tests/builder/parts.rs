@@ -5,10 +5,10 @@ use crate::support::meshes::{bent, blocks, hilly, linear};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::ops::ControlFlow;
-use tetralod::format::{EncodeOptions, encode};
+use tetralod::format::{BlockEncoder, BlockShelf, EncodeOptions, encode};
 use tetralod::mesh::{Field, Grid, TetMesh};
 use tetralod::mt::{Mt, MtKind, MultiTessellation, UpdatePages};
-use tetralod_build::parts::{self, Node, Part, PartUpdates, PartsError, Plan};
+use tetralod_build::parts::{self, Assembled, InMemory, Node, Part, PartUpdates, PartsError, Plan};
 use tetralod_build::verify::{self, Reference};
 use tetralod_build::{BuildConfig, BuildError, BuildProgress, BuildResult, OnProgress};
 
@@ -64,8 +64,51 @@ impl Files {
         read(&self.built[&node])
     }
 
+    /// The MT as a whole. Its file is the same where it is written while the MT is made.
     fn assemble(&self, plan: &Plan) -> BuildResult {
-        parts::assemble(plan, &|node| self.left(node), &|node| self.updates(node), &mut go_on).expect("an MT")
+        let (left, updates) = (|node| self.left(node), |node| self.updates(node));
+        let built = parts::assemble(plan, &left, &updates, &mut go_on).expect("an MT");
+        if built.exact.is_empty() {
+            let (mut aside, scratch) = (Aside::default(), InMemory::default());
+            let mut encoder = BlockEncoder::new(&mut aside);
+            let take = &mut |builder: &mut _| encoder.take_blocks(builder).map_err(PartsError::other);
+            let mesh = |node| Part::read_mesh(&mut Cursor::new(&self.built[&node]));
+            let made = parts::assemble_blocks(plan, (&mesh, &updates), &scratch, take, &mut go_on);
+            let Assembled { builder, summary, .. } = made.expect("an MT");
+            let mut bytes = Vec::new();
+            let (mt, len) = encoder.finish(builder, &options(&built), &mut bytes).expect("a file");
+            assert!(bytes == self::bytes(&built), "another file");
+            assert_eq!((mt.info(), summary, len), (built.mt.info(), built.summary, bytes.len() as u64));
+            // Never are all blocks in the MT.
+            let last = built.mt.updates().saturating_sub(1) >> built.mt.page_bits();
+            assert!((0..last).all(|page| !mt.has_page(page)), "blocks that were to be taken");
+            assert_eq!(scratch.names(), [""; 0], "nothing is left in the scratch");
+        }
+        built
+    }
+}
+
+/// Blocks that are put aside.
+#[derive(Default)]
+struct Aside(BTreeMap<u32, Vec<u8>>);
+
+impl BlockShelf for Aside {
+    fn put(&mut self, block: u32, bytes: &[u8]) -> std::io::Result<()> {
+        self.0.insert(block, bytes.to_vec());
+        Ok(())
+    }
+
+    fn get(&self, block: u32) -> std::io::Result<Vec<u8>> {
+        self.0.get(&block).cloned().ok_or_else(|| std::io::ErrorKind::NotFound.into())
+    }
+}
+
+fn options(built: &BuildResult) -> EncodeOptions {
+    EncodeOptions {
+        check_margins: true,
+        exact: built.exact.clone(),
+        histograms: true,
+        ..EncodeOptions::default()
     }
 }
 
@@ -85,12 +128,7 @@ pub fn in_parts(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> BuildResult
 }
 
 pub fn bytes(built: &BuildResult) -> Vec<u8> {
-    let options = EncodeOptions {
-        check_margins: true,
-        exact: built.exact.clone(),
-        histograms: true,
-        ..EncodeOptions::default()
-    };
+    let options = options(built);
     let bytes = encode(&built.mt, &options).expect("an MT that can be written");
     // In pages anew nothing is known of the blocks.
     let scanned = built.mt.in_pages(built.mt.page_bits()).expect("a complete MT");

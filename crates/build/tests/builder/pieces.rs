@@ -4,10 +4,9 @@ use crate::parts::parted;
 use crate::support::meshes::{bent, blocks, hilly, linear};
 use std::collections::BTreeMap;
 use std::fs;
-use std::io as std_io;
 use std::path::{Path, PathBuf};
 use tetralod::mesh::{Field, MeshPiece, RepairLevel, TetMesh, repair_at};
-use tetralod_build::parts::{Part, PartsError, Piecewise, Plan, Scratch};
+use tetralod_build::parts::{InMemory, Part, PartsError, Piecewise, Plan};
 use tetralod_build::{BuildConfig, FieldPrecision, mark_labels};
 use tetralod_io as io;
 use tetralod_io::{CellData, Pieces, ReadOptions};
@@ -26,25 +25,6 @@ impl Folder {
 impl Drop for Folder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// The scratch of a test.
-#[derive(Default)]
-struct Shelf(BTreeMap<String, Vec<u8>>);
-
-impl Scratch for Shelf {
-    fn write(&mut self, name: &str, bytes: &[u8]) -> std_io::Result<()> {
-        self.0.insert(name.to_owned(), bytes.to_vec());
-        Ok(())
-    }
-
-    fn read(&self, name: &str) -> std_io::Result<Vec<u8>> {
-        self.0.get(name).cloned().ok_or(std_io::ErrorKind::NotFound.into())
-    }
-
-    fn remove(&mut self, name: &str) -> std_io::Result<()> {
-        self.0.remove(name).map(drop).ok_or(std_io::ErrorKind::NotFound.into())
     }
 }
 
@@ -145,8 +125,8 @@ fn part_pieces(
     config: &BuildConfig,
     parts: u32,
 ) -> Result<(Plan, Vec<Part>), PartsError> {
-    let mut shelf = Shelf::default();
-    let mut parting = Piecewise::new(config, parts, &mut shelf)?;
+    let scratch = InMemory::default();
+    let mut parting = Piecewise::new(config, parts, &scratch)?;
     for piece in pieces {
         parting.add(piece.clone())?;
     }
@@ -155,7 +135,7 @@ fn part_pieces(
         all.push(part);
         Ok(())
     })?;
-    assert!(shelf.0.is_empty(), "nothing is left in the scratch: {:?}", shelf.0.keys());
+    assert!(scratch.names().is_empty(), "what is left in the scratch: {:?}", scratch.names());
     Ok((plan, all))
 }
 
@@ -307,7 +287,7 @@ fn what_only_a_whole_tells_is_left_to_it() {
     assert!(matches!(part_pieces(&good, &config, 3), Err(PartsError::Count { parts: 3 })));
     assert!(matches!(part_pieces(&good, &config, 4096), Err(PartsError::TooMany { parts: 4096, .. })));
     // What a folder loses is an error, not a panic.
-    let mut shelf = Shelf::default();
-    let parting = Piecewise::new(&config, 2, &mut shelf).expect("a beginning");
+    let scratch = InMemory::default();
+    let parting = Piecewise::new(&config, 2, &scratch).expect("a beginning");
     assert!(parting.part(BTreeMap::new(), &mut |_| Ok(())).is_err(), "without pieces");
 }
