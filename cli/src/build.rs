@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let [points, tetrahedra] = mesh.counts();
     let way = way(&arguments.asked(), &config, [points, tetrahedra, kept_fields(&config, &mesh)], None)?;
     if way == Way::Whole && mesh.is_grid_alone() {
-        mesh.expand_grid();
+        input::expand(&mut mesh, &options.inputs[0])?;
         (mesh, repaired) = input::mend(mesh, level, &options.inputs[0])?;
     }
     let repair = options.repair_of(&mesh, &repaired, way, verbosity)?;

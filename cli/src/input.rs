@@ -5,7 +5,9 @@ use super::{machine, output};
 use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use tetralod::mesh::{CellsToPoints, Field, RepairLevel, RepairReport, TetMesh, repair_at};
+use tetralod::mesh::{
+    CellsToPoints, Field, MAX_TETS, MeshError, RepairLevel, RepairReport, TetMesh, repair_at,
+};
 use tetralod::mt::{MultiTessellation, Regions};
 use tetralod_build::verify::Reference;
 use tetralod_io as io;
@@ -170,8 +172,18 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
 /// Reads what the MT was built from: time steps of a mesh, mended as it was then, or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let mut mesh = read_reference_alone(paths, opened)?;
-    mesh.expand_grid();
+    paths.first().map_or(Ok(()), |path| expand(&mut mesh, path))?;
     Ok(mesh)
+}
+
+/// Makes the points and tetrahedra of a grid alone, if one mesh can have so many.
+pub fn expand(mesh: &mut TetMesh, path: &Path) -> Result<()> {
+    let [_, tets] = mesh.counts();
+    if tets > MAX_TETS as u64 {
+        return Err(MeshError::TooMany { tets: tets as usize }).with_context(|| name(path));
+    }
+    mesh.expand_grid();
+    Ok(())
 }
 
 /// As [`read_reference`], but a regular grid comes without points and tetrahedra where only its values are needed.
@@ -192,7 +204,7 @@ pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMes
     let is_known = |name: &String| mesh.fields.iter().any(|field| field.answers_to(name));
     if mesh.is_grid_alone() && !names.iter().all(is_known) {
         // Fields of the geometry need its points.
-        mesh.expand_grid();
+        paths.first().map_or(Ok(()), |path| expand(&mut mesh, path))?;
     }
     if !mesh.is_grid_alone() {
         let is_label = |field: &Field| fields.iter().any(|info| info.is_label && info.is_of(field));

@@ -169,6 +169,8 @@ pub struct CellNumbers {
     kinds: Vec<(u32, &'static str)>,
     /// The first cell of each part of an input that has several, and what the part is called.
     parts: Vec<(u32, String)>,
+    /// What the input numbers each cell with, if that is not its place in a part; empty if it is.
+    own: Vec<u32>,
 }
 
 /// The cell of each tetrahedron; parts are numbered on.
@@ -197,12 +199,17 @@ impl CellNumbers {
     /// The cell of each tetrahedron, of so many cells; `kinds` are the first cell of each run of one type, with its name.
     pub fn each(numbers: Vec<u32>, cells: usize, kinds: Vec<(u32, &'static str)>) -> Self {
         let (tets, numbers) = (numbers.len(), Numbers::Each(numbers));
-        Self { tets, cells: cells as u32, numbers, kinds, parts: Vec::new() }
+        Self { tets, cells: cells as u32, numbers, kinds, ..Self::default() }
     }
 
     /// Says what the part of the input is called that all cells so far are of.
     pub fn name_part(&mut self, name: impl Into<String>) {
         self.parts = vec![(0, name.into())];
+    }
+
+    /// Says what the input numbers each of its cells with.
+    pub fn number_cells(&mut self, own: Vec<u32>) {
+        self.own = own;
     }
 
     /// The cell that a tetrahedron is of.
@@ -217,10 +224,17 @@ impl CellNumbers {
         let part = first(Some(self.parts.partition_point(|(first, _)| *first <= cell)));
         let part = part.and_then(|at| self.parts.get(at));
         InputCell {
-            number: cell - part.map_or(0, |(first, _)| *first),
+            number: self.own_number(cell),
             kind: kind.and_then(|at| self.kinds.get(at)).map(|(_, kind)| *kind),
             part: part.map(|(_, name)| name.clone()),
         }
+    }
+
+    /// What the input numbers a cell with: else its place in its part.
+    fn own_number(&self, cell: u32) -> u32 {
+        let part = self.parts.partition_point(|(first, _)| *first <= cell).checked_sub(1);
+        let first = part.and_then(|at| self.parts.get(at)).map_or(0, |(first, _)| *first);
+        self.own.get(cell as usize).copied().unwrap_or(cell - first)
     }
 
     /// The number of a tetrahedron's cell, numbered on over all parts. Those that nothing is known of are their own.
@@ -244,6 +258,10 @@ impl CellNumbers {
 
     fn append(&mut self, part: Self) {
         let (first, tets) = (self.cells, self.tets + part.tets);
+        if !self.own.is_empty() || !part.own.is_empty() {
+            self.own = (0..first).map(|cell| self.own_number(cell)).collect();
+            self.own.extend((0..part.cells).map(|cell| part.own_number(cell)));
+        }
         let go_on = |number: u32| first.saturating_add(number);
         let is_same = self.tets == first as usize
             && [&self.numbers, &part.numbers].into_iter().all(|numbers| *numbers == Numbers::Same);
@@ -277,7 +295,7 @@ const TETRAHEDRON: &str = "tetrahedron";
 pub struct InputCell {
     /// The part of the input that it is in, if there are several.
     pub part: Option<String>,
-    /// The number of the cell there, from 0.
+    /// The number of the cell there, from 0, or by which the input knows it.
     pub number: u32,
     /// What cells of its type are called, where not all are tetrahedra.
     pub kind: Option<&'static str>,

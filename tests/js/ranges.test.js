@@ -1,6 +1,7 @@
 // Ranges over fetch, from a server that misbehaves: the right bytes come, or an error that says what to do about it, after
 // a bounded number of requests.
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { after, before, test } from "node:test";
 import { crc32, gzipSync } from "node:zlib";
@@ -371,6 +372,14 @@ test("a file in shards comes as one, whatever the server tells of them", async (
       assert.ok(asked.length <= 16, `${what}: ${asked.length} requests`);
     }
   }
+});
+
+test("the page lets people choose all shards of a file", async () => {
+  const page = await readFile(new URL("../../www/index.html", import.meta.url), "utf8");
+  const [chooser] = /<input type="file" id="file"[^>]*>/.exec(page);
+  assert.match(chooser, / multiple /);
+  // Endings cannot name shards: `.0001` and all that follow.
+  assert.doesNotMatch(chooser, / accept=/);
 });
 
 test("a shard that is missing or has another length is named", async () => {

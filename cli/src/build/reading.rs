@@ -91,14 +91,20 @@ impl BuildOptions {
             || config.fields.iter().any(needs_points);
         let [path] = &self.inputs[..] else { return Ok(None) };
         let is_list = files::ending(path) == "pvtu";
-        if needs_whole || !is_list && !BY_RANGES.contains(&files::ending(path).as_str()) {
+        let is_known = || {
+            let by_ranges = BY_RANGES.contains(&files::ending(path).as_str());
+            Ok::<_, anyhow::Error>(is_list || by_ranges || Pieces::are_beside(path)?)
+        };
+        if needs_whole || !is_known()? {
             return Ok(None);
         }
         let steps = tetralod_io::steps(path)?;
-        let [step] = &steps[..] else { return Ok(None) };
-        if self.step.is_some_and(|step| step != 0) {
-            return Ok(None);
-        }
+        // Several of them are read as one mesh, which is the whole.
+        let step = match (&steps[..], self.step) {
+            ([only], None) => only,
+            (_, Some(number)) if let Some(step) = steps.get(number) => step,
+            _ => return Ok(None),
+        };
         let wanted = FieldSelection {
             names: &config.fields,
             all: config.all_fields,

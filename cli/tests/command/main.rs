@@ -4,6 +4,8 @@ mod commands;
 #[path = "../../../tests/support/data.rs"]
 mod data;
 mod deform;
+#[path = "../../../tests/support/exodus.rs"]
+mod exodus;
 mod fields;
 mod gallery;
 mod generate;

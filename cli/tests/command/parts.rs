@@ -185,6 +185,52 @@ fn pieces_are_built_as_their_whole() {
     assert_eq!(folder.names().len(), names + 2, "nothing is left behind: {:?}", folder.names());
 }
 
+/// Any name of a decomposition stands for all of it, with the bytes of the same mesh in one file.
+#[test]
+fn decompositions_of_exodus_are_one_input() {
+    let folder = Folder::new("parts-exodus");
+    let (whole, pieces) = crate::exodus::decomposed(4, &|_, _| ());
+    for (number, piece) in pieces.iter().enumerate() {
+        fs::write(folder.path(&format!("a.e.4.{number}")), piece).expect("a file");
+    }
+    let [base, one, undivided] = ["a.e", "a.e.4.2", "whole.e"].map(|name| folder.path(name));
+    fs::write(&undivided, whole).expect("a file");
+    let [vtu, dir, mt, other] = ["a.vtu", "dir", "a.mt", "b.mt"].map(|name| folder.path(name));
+    let mesh = io::read_with(Path::new(&base), &io::ReadOptions { step: 1, ..io::ReadOptions::default() });
+    let mut bytes = Vec::new();
+    io::write_vtu(&mesh.expect("a mesh"), &mut bytes).expect("bytes");
+    fs::write(&vtu, bytes).expect("a file");
+    let same = || fs::read(&mt).expect("a file") == fs::read(&other).expect("a file");
+    for parts in [&[][..], &["--parts", "2"]] {
+        good(&[&["build", &vtu, "-o", &other][..], parts].concat());
+        for input in [&base, &one] {
+            good(&[&["build", input, "--step", "1", "-o", &mt][..], parts].concat());
+            assert!(same(), "{input} {parts:?}");
+        }
+    }
+    let parted = json(&["part", &one, "--step", "1", "--parts", "2", "-o", &dir, "--json"]);
+    assert_eq!(parted["tetrahedra"], 6 * 8 * 3 * 2);
+    good(&["work", &dir, "--quiet"]);
+    fs::copy(format!("{dir}/built.mt"), &mt).expect("a file");
+    assert!(same(), "by a worker");
+    // All steps, and blocks, as of the one file: whoever verifies knows no order of the points.
+    good(&["build", &base, "--preserve", "block", "-o", &mt]);
+    assert_eq!(json(&["info", &mt, "--json"])["fields"].as_array().map(Vec::len), Some(2));
+    assert_eq!(json(&["verify", &mt, "--against", &base, "--json"])["valid"], true);
+    good(&["build", &undivided, "--preserve", "block", "-o", &other]);
+    let counts = |mt: &str| {
+        let info = json(&["info", mt, "--json"]);
+        (info["vertices"].clone(), info["tetrahedra"].clone(), info["regions"].clone())
+    };
+    assert_eq!(counts(&mt), counts(&other));
+    // What is read is not written over, and what is missing is named.
+    bad(1, &["build", &base, "-o", &one], &["is an input, too"]);
+    fs::remove_file(folder.path("a.e.4.3")).expect("a file");
+    for command in [&["build", &base, "-o", &mt][..], &["part", &one, "--parts", "2", "-o", &dir]] {
+        bad(1, command, &["a.e.4.3\" is not there"]);
+    }
+}
+
 #[test]
 fn ranges_of_cells_are_built_as_their_whole() {
     let folder = Folder::new("parts-ranges");

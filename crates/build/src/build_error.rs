@@ -192,8 +192,11 @@ pub enum BuildError {
     /// The mesh is not convex: insertion fills the convex hull of the points.
     #[error("the mesh does not fill its convex hull, which insertion would do; build by decimation")]
     NotConvex,
-    /// More vertices than an MT can number.
-    #[error("the mesh has more than 2^30 points; split it into parts")]
+    /// More vertices or tetrahedra than an MT can number.
+    #[error(
+        "the mesh has more than 2^30 points, or more tetrahedra than have numbers: 2^30 - 1 in one mesh or part, 2^32 - 1 in all parts; \
+         build it in more parts, or split it"
+    )]
     TooLarge,
     /// The caller stopped the work.
     #[error("stopped")]

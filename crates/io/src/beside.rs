@@ -115,6 +115,12 @@ impl<'a> FilesOf<'a> {
         Ok(FileBytes::new(std::fs::read(path).map_err(&reason)?, held))
     }
 
+    /// Notes that another file than the given one is read.
+    #[cfg(feature = "hdf5")]
+    pub fn note(&self, path: PathBuf) {
+        self.read.borrow_mut().push(path);
+    }
+
     /// The one that was read last.
     pub fn last(&self) -> Option<PathBuf> {
         self.read.borrow().last().cloned()

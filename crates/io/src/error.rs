@@ -142,6 +142,17 @@ impl ReadReason {
     pub(crate) fn unsupported(what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Unsupported { what: what.into(), remedy: remedy.into() }
     }
+
+    /// The same of the cell that has another number elsewhere.
+    pub(crate) fn with_cell(mut self, number: impl Fn(u64) -> u64) -> Self {
+        if let Self::MissingPoint { cell, .. }
+        | Self::Polyhedron { cell, .. }
+        | Self::NotFiniteCell { cell, .. } = &mut self
+        {
+            *cell = number(*cell);
+        }
+        self
+    }
 }
 
 /// Checks that there are as many of something as there should be.

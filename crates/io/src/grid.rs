@@ -7,10 +7,10 @@ use crate::error::{ReadReason, expect_count};
 use crate::fields::{check_finite, check_finite_cells};
 use crate::ghosts::HIDDEN_POINT;
 use crate::{cell_types, cells};
-use tetralod::mesh::{CellNumbers, Field, Grid, MeshInput, TetMesh, kuhn_tets};
+use tetralod::mesh::{CellNumbers, Field, Grid, MAX_TETS, MeshInput, TetMesh, kuhn_tets};
 
-/// Most points of a grid: 512³. Its tetrahedra take some 13 GB.
-pub(super) const MAX_GRID_POINTS: u64 = 1 << 27;
+/// Most points of a grid: those that numbers of 32 bits tell apart, some 1600³, where memory has addresses for them.
+pub(super) const MAX_GRID_POINTS: u64 = if usize::BITS < 64 { 1 << 27 } else { u32::MAX as u64 };
 
 /// First and last index along x, y and z.
 pub(super) type Extent = [i64; 6];
@@ -78,7 +78,7 @@ impl Placement {
             return grid_mesh(grid, values, memory);
         }
         let dims = checked_dims(self.dims)?;
-        memory.expect(bytes(dims))?;
+        memory.expect(bytes(dims)?)?;
         mesh(dims, self.positions()?, values, memory)
     }
 }
@@ -158,10 +158,15 @@ pub(super) fn most_tets(dims: [u64; 3]) -> u64 {
     dims.iter().map(|d| d.saturating_sub(1)).fold(6, u64::saturating_mul)
 }
 
-/// Bytes of the points and tetrahedra of a grid.
-pub(super) fn bytes(dims: [u32; 3]) -> u64 {
+/// Bytes of the points and tetrahedra of a grid, which one mesh must be able to hold: a grid alone may be larger.
+pub(super) fn bytes(dims: [u32; 3]) -> Result<u64, ReadReason> {
     let points: u64 = dims.iter().map(|d| u64::from(*d)).product();
-    24 * points + 6 * 16 * cubes(dims) as u64
+    let cubes = cubes(dims) as u64;
+    if cubes > MAX_TETS as u64 / 6 {
+        let what = "tetrahedra of a grid that is read as one mesh, six for each of its cubes".into();
+        return Err(ReadReason::TooLarge { what, limit: MAX_TETS as u64 });
+    }
+    Ok(24 * points + 6 * 16 * cubes)
 }
 
 /// The positions of a grid with these coordinates along each axis.
@@ -221,7 +226,7 @@ pub(super) fn mesh(
     memory: &MemoryLimit,
 ) -> Result<TetMesh, ReadReason> {
     expect_count("points", dims.iter().map(|d| u64::from(*d)).product::<u64>(), positions.len())?;
-    memory.take(bytes(dims))?;
+    memory.take(bytes(dims)?)?;
     with_values(TetMesh { positions, tets: kuhn_tets(dims), ..TetMesh::default() }, dims, values, memory)
 }
 
@@ -241,7 +246,7 @@ pub(super) fn with_values(
     let count = self::cubes(dims);
     if left_out.is_some() || mesh.cell_fields.iter().any(|field| !field.values.is_empty()) {
         if mesh.is_grid_alone() {
-            memory.take(bytes(dims))?;
+            memory.take(bytes(dims)?)?;
         }
         mesh.expand_grid();
     }
@@ -282,4 +287,37 @@ fn used(dims: [u32; 3], left_out: &[i64]) -> Vec<bool> {
         corners(dims, cube).into_iter().for_each(|point| used[point] = true);
     }
     used
+}
+
+#[cfg(all(test, target_pointer_width = "64"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_numbers_of_32_bits_tell_apart_is_a_grid() {
+        let said = |dims: [u64; 3]| checked_dims(dims).map_err(|error| error.to_string());
+        assert_eq!(said([1625, 1625, 1626]), Ok([1625, 1625, 1626]));
+        assert_eq!(said([2, 2, (1 << 30) - 1]), Ok([2, 2, (1 << 30) - 1]));
+        for dims in [[4096; 3], [1626; 3], [2, 2, 1 << 30], [u64::MAX; 3], [1 << 32, 1 << 32, 2]] {
+            assert_eq!(
+                said(dims),
+                Err("more than 4294967295 grid points; split the data".into()),
+                "{dims:?}"
+            );
+        }
+        // One mesh has fewer tetrahedra.
+        assert_eq!(bytes([513; 3]), Ok(24 * 513_u64.pow(3) + 96 * 512_u64.pow(3)));
+        let error = bytes([565; 3]).unwrap_err().to_string();
+        assert!(
+            error.contains("more than 1073741823 tetrahedra of a grid that is read as one mesh"),
+            "{error}"
+        );
+        let whole = Placement {
+            dims: [1600; 3],
+            origin: [0.0; 3],
+            steps: [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+        };
+        let refused = whole.mesh(GridValues::default(), &MemoryLimit::default());
+        assert!(matches!(refused, Err(ReadReason::TooLarge { .. })), "{refused:?}");
+    }
 }

@@ -763,7 +763,7 @@ impl<'a> Body<'a> {
         }
         let coordinates = std::mem::take(&mut self.coordinates);
         self.expect_tuples(grid::cubes(dims))?;
-        self.memory.expect(2 * grid::bytes(dims)).at(|| "DIMENSIONS".into())?;
+        grid::bytes(dims).and_then(|bytes| self.memory.expect(2 * bytes)).at(|| "DIMENSIONS".into())?;
         self.curvilinear(points_from(&grid::rectilinear(&coordinates)))
     }
 

@@ -5,12 +5,17 @@
 
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "hdf5")]
+use crate::MemoryLimit;
 use crate::beside::{FilesOf, place};
 use crate::error::{At, ReadError, ReadReason, Stop, in_file};
 use crate::file_kind::without_mark;
 #[cfg(feature = "hdf5")]
+use crate::formats::exodus_pieces::{Decomposition, ExodusPieces};
+#[cfg(feature = "hdf5")]
 use crate::formats::vtkhdf_ranges::HdfFile;
 use crate::listed::{for_each_file, names};
+use crate::pvtu::{Identity, bits};
 use crate::ranges::InPieces;
 use crate::shared_points::{SharedPoints, hash};
 use crate::vtu::PieceReader;
@@ -71,6 +76,21 @@ impl Pieces {
             Err(Stop::Whole(why)) => Ok(Err(Some(why))),
             Err(Stop::Read(error)) => Err(in_file(error, &path.display().to_string())),
         }
+    }
+
+    /// Whether the file at a path stands for several with a piece each, whatever there is at this path itself: a decomposition of Exodus.
+    ///
+    /// # Errors
+    /// If a piece is not there, or there are several decompositions.
+    pub fn are_beside(path: &Path) -> Result<bool, ReadError> {
+        #[cfg(feature = "hdf5")]
+        let found = Decomposition::of(&FilesOf::on_disk(path, &MemoryLimit::default()))?.is_some();
+        #[cfg(not(feature = "hdf5"))]
+        let found = {
+            let _ = path;
+            false
+        };
+        Ok(found)
     }
 
     /// The files with the pieces, which may not be there.
@@ -171,7 +191,7 @@ impl Pieces {
         let time = for_each_file(document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let points = reader.piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
-                hashes.extend(reader.points(points)?.into_iter().map(hash));
+                hashes.extend(reader.points(points)?.into_iter().map(bits).map(hash));
                 Ok(())
             })
         })?;
@@ -180,7 +200,7 @@ impl Pieces {
         for_each_file(document, &beside, &self.options.memory, &mut |file| {
             self.each_reader(file, &mut |reader| {
                 let place = || format!("piece {}, <PointData>", reader.number);
-                let mut piece = shared.read(&mut |numbers| reader.read(numbers), &place)?;
+                let mut piece = shared.read(Identity::Places, &mut |numbers| reader.read(numbers), &place)?;
                 let MeshPiece { mesh: TetMesh { fields, cell_fields, input, .. }, .. } = &mut piece;
                 input.files.0.extend(files.last());
                 fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
@@ -206,6 +226,10 @@ impl Pieces {
 impl Content {
     /// A file that has several ranges; none if it is another one, or has not.
     fn of(path: &Path, options: &ReadOptions, most: Option<u64>) -> Result<Option<Self>, Stop> {
+        #[cfg(feature = "hdf5")]
+        if let Some(pieces) = ExodusPieces::open(path, options)? {
+            return Ok(Some(Self::File(Box::new(pieces))));
+        }
         #[cfg(feature = "hdf5")]
         if let Some(file) = HdfFile::open(path, options, most)? {
             return Ok(Some(Self::File(Box::new(file))));

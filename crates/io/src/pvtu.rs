@@ -13,7 +13,7 @@ use crate::numbering::Numbering;
 use crate::options::{Beside, ReadOptions};
 use crate::vtu::{NumberPoints, first_number, join, readers};
 use crate::xml::Document;
-use tetralod::geom::bits_of;
+use tetralod::geom::{Bounds, bits_of};
 use tetralod::mesh::TetMesh;
 
 /// Reads a document of type `PUnstructuredGrid`, and the time of its pieces.
@@ -32,7 +32,7 @@ pub(super) fn read(
 pub(super) struct Whole {
     pub mesh: TetMesh,
     /// The first point at each place.
-    known: HashMap<[u64; 3], u32>,
+    known: HashMap<Key, u32>,
     has_pieces: bool,
 }
 
@@ -41,7 +41,7 @@ impl Whole {
     fn append(&mut self, document: &Document<'_>, options: &ReadOptions) -> Result<(), ReadError> {
         for reader in readers(document, options) {
             let place = || format!("{}, <PointData>", reader.place());
-            self.add(&mut |numbers| reader.read(numbers), &place)?;
+            self.add(Identity::Places, &mut |numbers| reader.read(numbers), &place)?;
         }
         Ok(())
     }
@@ -49,6 +49,7 @@ impl Whole {
     /// Appends the piece that `read` reads, given how to number its points; `place` is where its fields are.
     pub fn add(
         &mut self,
+        identity: Identity<'_>,
         read: &mut dyn FnMut(NumberPoints<'_>) -> Result<TetMesh, ReadError>,
         place: &dyn Fn() -> String,
     ) -> Result<(), ReadError> {
@@ -57,7 +58,9 @@ impl Whole {
         let (mut new, mut count) = (Vec::new(), 0);
         let mut part = read(&mut |points| {
             let numbers;
-            (numbers, new) = numbered(points, first, |point| self.known.get(&bits(point)).copied())?;
+            let known =
+                |key| self.known.get(&key).map(|&number| (number, self.mesh.positions[number as usize]));
+            (numbers, new) = numbered(points, identity, first, known)?;
             count = points.len();
             Ok(Numbering::Each { numbers, next: (first + new.len()) as u32 })
         })?;
@@ -68,7 +71,7 @@ impl Whole {
         for (number, (at, point)) in (first as u32..).zip(part.positions.iter().enumerate()) {
             // Points that no cell uses may have no values; another piece has them.
             if part.fields.iter().all(|field| field.values[at].is_finite()) {
-                self.known.entry(bits(*point)).or_insert(number);
+                self.known.entry(identity.key(new[at], *point)).or_insert(number);
             }
         }
         let is_first = !std::mem::replace(&mut self.has_pieces, true);
@@ -76,18 +79,61 @@ impl Whole {
     }
 }
 
-/// The numbers of a piece's points, and which of them are new, from number `first` on; `known` gives that of a place. Points of one piece
-/// stay different.
+/// What a point is known by in all pieces that have it.
+pub(super) type Key = [u64; 3];
+
+/// What makes points of different pieces one.
+#[derive(Clone, Copy)]
+pub(super) enum Identity<'a> {
+    /// Their places.
+    Places,
+    /// Their numbers in the whole; of points that have none, their places.
+    #[cfg_attr(not(feature = "hdf5"), expect(dead_code, reason = "only a format of this feature has them"))]
+    Numbers(&'a [i64]),
+}
+
+impl Identity<'_> {
+    /// The key of a piece's point.
+    pub fn key(self, index: usize, place: [f64; 3]) -> Key {
+        match self {
+            Self::Numbers(numbers) if index < numbers.len() => key_of(numbers[index]),
+            _ => bits(place),
+        }
+    }
+}
+
+/// The key of a point with a number: that of no place, whose coordinates are finite.
+pub(super) fn key_of(number: i64) -> Key {
+    [number as u64, u64::MAX, u64::MAX]
+}
+
+/// Points of one number may lie this far apart, as a part of a piece's diagonal: programs round differently.
+const SAME_PLACE: f64 = 1e-6;
+
+/// The numbers of a piece's points, and which of them are new, from number `first` on; `known` gives the number and the place of a point with
+/// a key. Points of one piece stay different.
 pub(super) fn numbered(
     points: &[[f64; 3]],
+    identity: Identity<'_>,
     first: usize,
-    known: impl Fn([f64; 3]) -> Option<u32>,
+    known: impl Fn(Key) -> Option<(u32, [f64; 3])>,
 ) -> Result<(Vec<u32>, Vec<usize>), ReadReason> {
     first_number(first, points.len())?;
     let (mut numbers, mut new, mut taken) = (Vec::new(), Vec::new(), HashSet::new());
+    let far = match identity {
+        Identity::Places => f64::INFINITY,
+        Identity::Numbers(_) => SAME_PLACE * Bounds::of(points).diagonal(),
+    };
     for (index, &point) in points.iter().enumerate() {
-        let known = known(point).filter(|&number| taken.insert(number));
-        numbers.push(known.unwrap_or((first + new.len()) as u32));
+        let known = known(identity.key(index, point)).filter(|(number, _)| taken.insert(*number));
+        if let (Some((_, place)), Identity::Numbers(names)) = (known, identity)
+            && (0..3).any(|i| (place[i] - point[i]).abs() > far)
+        {
+            let name = names.get(index).copied().unwrap_or_default();
+            let what = format!("point {name} lies at {point:?}, but in an earlier piece at {place:?}");
+            return Err(ReadReason::Syntax(what));
+        }
+        numbers.push(known.map_or((first + new.len()) as u32, |(number, _)| number));
         if known.is_none() {
             new.push(index);
         }
@@ -96,7 +142,7 @@ pub(super) fn numbered(
 }
 
 /// The bits of a position.
-pub(super) fn bits(point: [f64; 3]) -> [u64; 3] {
+pub(super) fn bits(point: [f64; 3]) -> Key {
     point.map(bits_of)
 }
 

@@ -278,15 +278,5 @@ fn tets_of(
     }
     let connectivity = grid.points_of_cells(begun..in_list(end)?)?;
     let split = CellList { types, ends, connectivity }.split(numbering, &mut Vec::new(), &mut [], memory);
-    split.map_err(|reason| at(of_all(reason, first), "connectivity"))
-}
-
-/// What is said of a cell by its number in a range, by its number in all.
-fn of_all(reason: ReadReason, first: u64) -> ReadReason {
-    match reason {
-        ReadReason::MissingPoint { cell, point, points } => {
-            ReadReason::MissingPoint { cell: first.saturating_add(cell), point, points }
-        }
-        other => other,
-    }
+    split.map_err(|reason| at(reason.with_cell(|cell| first.saturating_add(cell)), "connectivity"))
 }

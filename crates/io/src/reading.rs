@@ -28,7 +28,7 @@ pub(super) fn settled(mut mesh: TetMesh) -> TetMesh {
 /// A mesh with the points and tetrahedra of its grid.
 pub(super) fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMesh, ReadReason> {
     if let Some(grid) = mesh.grid.filter(|_| mesh.is_grid_alone()) {
-        options.memory.take(grid::bytes(grid.dims))?;
+        options.memory.take(grid::bytes(grid.dims)?)?;
     }
     mesh.expand_grid();
     Ok(mesh)

@@ -1,17 +1,17 @@
-//! Pieces that have points of their own: those at one place are one point, which all of these pieces have.
+//! Pieces that have points of their own: those at one place, or of one number, are one point, which all of these pieces have.
 
 use std::collections::HashMap;
 
 use crate::error::{At, ReadError};
 use crate::fields::settle_unused;
 use crate::numbering::Numbering;
-use crate::pvtu::{bits, numbered};
+use crate::pvtu::{Identity, Key, numbered};
 use crate::vtu::{NumberPoints, in_order};
 use tetralod::mesh::{Field, MeshPiece, Middles, TetMesh};
 
-/// A hash of a place.
-pub(super) fn hash(point: [f64; 3]) -> u64 {
-    bits(point).into_iter().fold(0, |hash, word| {
+/// A hash of what a point is known by.
+pub(super) fn hash(key: Key) -> u64 {
+    key.into_iter().fold(0, |hash, word| {
         let mixed = (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         mixed ^ (mixed >> 32)
     })
@@ -26,10 +26,10 @@ fn repeated(mut hashes: Vec<u64>) -> Vec<u64> {
 /// The points that several pieces have, as far as these were read.
 #[derive(Default)]
 pub(super) struct SharedPoints {
-    /// Hashes of all places that may be in several pieces, sorted.
+    /// Hashes of the keys of all points that may be in several pieces, sorted.
     several: Vec<u64>,
-    /// The first point at each of these places: its number, and its place in `first`.
-    known: HashMap<[u64; 3], (u32, usize)>,
+    /// The first point of each of these keys: its number, and its place in `first`.
+    known: HashMap<Key, (u32, usize)>,
     /// The positions of these points, and their values field by field.
     first: Vec<[f64; 3]>,
     values: Vec<f64>,
@@ -39,7 +39,7 @@ pub(super) struct SharedPoints {
 }
 
 impl SharedPoints {
-    /// Of pieces with points at the places that have these hashes.
+    /// Of pieces with points whose keys have these hashes.
     pub fn of(hashes: Vec<u64>) -> Self {
         Self { several: repeated(hashes), ..Self::default() }
     }
@@ -47,15 +47,19 @@ impl SharedPoints {
     /// The piece that `read` reads, given how to number its points; `place` is where its fields are.
     pub fn read(
         &mut self,
+        identity: Identity<'_>,
         read: &mut dyn FnMut(NumberPoints<'_>) -> Result<TetMesh, ReadError>,
         place: &dyn Fn() -> String,
     ) -> Result<MeshPiece, ReadError> {
         let (mut numbers, mut new) = (Vec::new(), Vec::new());
         let mut mesh = read(&mut |points| {
             // Of most points it is known without a look into the table that it does not have them.
-            let is_known = |point| self.several.binary_search(&hash(point)).is_ok();
-            let known = |point| self.known.get(&bits(point)).filter(|_| is_known(point));
-            (numbers, new) = numbered(points, self.points, |point| known(point).map(|(number, _)| *number))?;
+            let is_known = |key| self.several.binary_search(&hash(key)).is_ok();
+            let known = |key| {
+                let found = Some(key).filter(|key| is_known(*key)).and_then(|key| self.known.get(&key));
+                found.map(|(number, at)| (*number, self.first[*at]))
+            };
+            (numbers, new) = numbered(points, identity, self.points, known)?;
             Ok(Numbering::Each { numbers: numbers.clone(), next: (self.points + new.len()) as u32 })
         })?;
         // Those that cells got in reading.
@@ -85,7 +89,7 @@ impl SharedPoints {
         mesh.tets.iter_mut().for_each(|tet| *tet = tet.map(own));
         let count = mesh.fields.len();
         for i in old {
-            let (_, at) = self.known[&bits(mesh.positions[i])];
+            let (_, at) = self.known[&identity.key(i, mesh.positions[i])];
             mesh.positions[i] = self.first[at];
             for (f, field) in mesh.fields.iter_mut().enumerate() {
                 field.values[i] = self.values[at * count + f];
@@ -94,9 +98,10 @@ impl SharedPoints {
         for &i in &new {
             let position = mesh.positions[i];
             let has_values = mesh.fields.iter().all(|field| field.values[i].is_finite());
-            if has_values && self.several.binary_search(&hash(position)).is_ok() {
+            let key = identity.key(i, position);
+            if has_values && self.several.binary_search(&hash(key)).is_ok() {
                 let (number, at) = (numbers[i], self.first.len());
-                if let std::collections::hash_map::Entry::Vacant(entry) = self.known.entry(bits(position)) {
+                if let std::collections::hash_map::Entry::Vacant(entry) = self.known.entry(key) {
                     entry.insert((number, at));
                     self.first.push(position);
                     self.values.extend(mesh.fields.iter().map(|field| field.values[i]));

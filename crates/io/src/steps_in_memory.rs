@@ -150,6 +150,9 @@ impl FilesInMemory {
             _ => {}
         }
         let head = packed::head(bytes);
+        if let Some(pieces) = formats::pieces_beside(name, &head) {
+            return pieces;
+        }
         if !without_mark(&head).starts_with(b"<") {
             return formats::named_by(without_gz(name), &head);
         }

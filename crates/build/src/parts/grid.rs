@@ -5,7 +5,7 @@
 use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
 use super::piece::{Carried, Part, Piece};
-use super::plan::Plan;
+use super::plan::{MOST_TETS, Plan};
 use crate::error::points::as_vec;
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
@@ -43,7 +43,7 @@ impl<'a> GridCut<'a> {
     pub fn new(mesh: &'a TetMesh, config: &BuildConfig, parts: u32) -> Result<Option<Self>, PartsError> {
         let Some(grid) = mesh.grid else { return Ok(None) };
         let [points, tetrahedra] = mesh.counts();
-        if points > u64::from(MAX_UPDATES) || tetrahedra > MAX_TETS as u64 {
+        if points > u64::from(MAX_UPDATES) || tetrahedra > MOST_TETS {
             return Err(BuildError::TooLarge.into());
         }
         if tetrahedra == 0 {
@@ -160,6 +160,11 @@ impl<'a> GridCut<'a> {
             }
             self.cuts.push(cuts);
             boxes = halves;
+        }
+        let tets =
+            |cells: &[Range<u32>; 3]| 6 * cells.iter().map(|range| range.len() as u64).product::<u64>();
+        if boxes.iter().any(|cells| tets(cells) > MAX_TETS as u64) {
+            return Err(BuildError::TooLarge.into());
         }
         self.boxes = boxes;
         Ok(())
@@ -350,4 +355,47 @@ fn indices([xs, ys, zs]: [Range<u32>; 3]) -> impl Iterator<Item = [u32; 3]> {
         let xs = xs.clone();
         ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z]))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn alone(dims: [u32; 3]) -> TetMesh {
+        let grid = Some(Grid { dims, origin: [0.0; 3], spacing: [1.0; 3] });
+        TetMesh { grid, ..TetMesh::default() }
+    }
+
+    #[test]
+    fn a_grid_of_as_many_tetrahedra_as_have_numbers_is_cut() {
+        let mesh = &alone([895, 895, 893]);
+        let config = BuildConfig::default();
+        let grid = mesh.grid.expect("a grid");
+        let lattice = position_lattice::of_grid(&grid, &config).expect("a lattice");
+        let spare = ((grid.spacing[0] / lattice.step[0]) as u32).ilog2();
+        let cut = |parts: u32| {
+            let (fields, cuts, kept, boxes) = Default::default();
+            let mut cut = GridCut { grid, lattice, spare, fields, mesh, cuts, kept, boxes };
+            cut.cut(parts).map(|()| cut)
+        };
+        // Four have too many each.
+        assert!(matches!(cut(4), Err(PartsError::Build(BuildError::TooLarge))));
+        let cut = cut(64).expect("parts");
+        let cells = |cells: &[Range<u32>; 3]| cells.iter().map(|range| range.len() as u64).product::<u64>();
+        let [points, tetrahedra] = mesh.counts();
+        assert_eq!(6 * cut.boxes.iter().map(cells).sum::<u64>(), tetrahedra);
+        assert!(tetrahedra > u64::from(u32::MAX) - (1 << 26) && points < u64::from(MAX_UPDATES));
+        for (part, cells) in (0..).zip(&cut.boxes) {
+            let corners = [cells.clone().map(|range| range.start), cells.clone().map(|range| range.end - 1)];
+            assert_eq!(corners.map(|cell| cut.part_of(cell)), [part; 2]);
+        }
+    }
+
+    #[test]
+    fn more_is_refused_before_anything_else() {
+        for dims in [[1024; 3], [896; 3], [1625; 3], [2, 1 << 15, 1 << 15]] {
+            let refused = GridCut::new(&alone(dims), &BuildConfig::default(), 64);
+            assert!(matches!(refused.err(), Some(PartsError::Build(BuildError::TooLarge))), "{dims:?}");
+        }
+    }
 }

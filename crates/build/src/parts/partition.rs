@@ -15,7 +15,7 @@ use crate::restrict::restrictions::Restrictions;
 use crate::{BuildConfig, BuildCriterion, BuildError};
 use std::collections::BTreeMap;
 use tetralod::geom::Bounds;
-use tetralod::mesh::{FACES, Field, TetMesh};
+use tetralod::mesh::{FACES, Field, MAX_TETS, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
 /// Parts `mesh`, which must be valid, or a grid alone ([`TetMesh::of_grid_alone`]), of which no more than the values and a part are in
@@ -48,6 +48,9 @@ pub fn part(
         let alone = if config.preserve.is_empty() { GridCut::new(mesh, config, parts)? } else { None };
         if let Some(cut) = alone {
             return cut.part(config, purpose, metadata, put);
+        }
+        if mesh.counts()[1] > MAX_TETS as u64 {
+            return Err(BuildError::TooLarge.into());
         }
         let mut whole = mesh.clone();
         whole.expand_grid();

@@ -8,7 +8,7 @@ use super::cut::{CUT_BITS, best_cut, shift};
 use super::fragments::{Band, Fragments, PieceParts};
 use super::partition::{between, shared_faces};
 use super::piece::Part;
-use super::plan::{Plan, purpose};
+use super::plan::{MOST_TETS, Plan, purpose};
 use super::prepared::{Prepared, Stored, Whole, places};
 use super::scratch::Scratch;
 use crate::lattice::field_lattice;
@@ -21,7 +21,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use tetralod::geom::{Bounds, Lattice, WIDE_BITS, bits_of};
-use tetralod::mesh::{BitSet, Extremes, FACES, Field, MAX_TETS, MOST_LABELS, MeshInput, MeshPiece, TetMesh};
+use tetralod::mesh::{BitSet, Extremes, FACES, Field, MOST_LABELS, MeshInput, MeshPiece, TetMesh};
 use tetralod::mt::MAX_UPDATES;
 
 /// A mesh that is parted piece by piece.
@@ -152,7 +152,7 @@ impl<'a> Piecewise<'a> {
         }
         let end = u64::from(first) + new.len() as u64;
         sums.tets += mesh.tets.len() as u64;
-        if end > u64::from(MAX_UPDATES) || sums.tets > MAX_TETS as u64 {
+        if end > u64::from(MAX_UPDATES) || sums.tets > MOST_TETS {
             return Err(BuildError::TooLarge.into());
         }
         sums.points = end as u32;

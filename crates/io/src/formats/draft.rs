@@ -8,6 +8,7 @@ use crate::error::{ReadReason, expect_count};
 use crate::fields::{Collector, check_finite, check_finite_cells};
 use crate::number::points_from;
 use crate::numbering::Numbering;
+use crate::vtu::NumberPoints;
 use crate::{CellData, ReadOptions};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
 
@@ -92,7 +93,12 @@ impl<'a> Draft<'a> {
     }
 
     /// The mesh. Without cells it has points alone.
-    pub fn finish(mut self) -> Result<TetMesh, ReadReason> {
+    pub fn finish(self) -> Result<TetMesh, ReadReason> {
+        self.finish_numbered(&mut |points| Ok(Numbering::From { first: 0, points: points.len() }))
+    }
+
+    /// The mesh, whose points are numbered as `numbers` says.
+    pub fn finish_numbered(mut self, numbers: NumberPoints<'_>) -> Result<TetMesh, ReadReason> {
         let memory = &self.options.memory;
         memory.take(8 * self.coordinates.len() as u64)?;
         let mut positions = points_from(&self.coordinates);
@@ -107,6 +113,7 @@ impl<'a> Draft<'a> {
         self.input.other_fields = self.fields.others;
         if self.list.types.is_empty() {
             check_finite(&positions, &fields, &|| None)?;
+            numbers(&positions)?;
             let Self { input, notes, .. } = self;
             return Ok(TetMesh { positions, fields, input, notes, ..TetMesh::default() });
         }
@@ -117,7 +124,7 @@ impl<'a> Draft<'a> {
         check_finite(&positions, &fields, &|| Some(self.list.used(positions.len())))?;
         let cells = self.list.types.len();
         cells::checked_ends(&self.list.types, &self.list.ends)?;
-        let numbering = Numbering::From { first: 0, points: positions.len() };
+        let numbering = numbers(&positions)?;
         let split = self.list.split(&numbering, &mut positions, &mut fields, memory)?;
         let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
         check_finite_cells(&cell_fields, |_| true)?;

@@ -3,27 +3,30 @@
 //! The faces of polyhedra (`NFACED`) are in blocks of their own. The numbers of blocks become the field `block` at cells. Variables
 //! whose names differ in a last letter x, y or z are a vector; six with xx, yy, zz, xy, yz, zx a symmetric tensor, nine any.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use netcdf_reader::{NcFile, NcGroup, NcSliceInfo, NcSliceInfoElem, NcVariable};
 
 use crate::ReadOptions;
 use crate::cell_types::POLYHEDRON;
 use crate::error::{At, ReadError, ReadReason, expect_count};
-use crate::fields::component_name;
+use crate::fields::{Collector, component_name};
 use crate::formats::draft::Draft;
 use crate::formats::exodus_cells::{Element, element};
 use crate::formats::hdf5_values::{checked_times, netcdf_reason};
+use crate::numbering::Numbering;
 use crate::polyhedra::SharedFaces;
+use crate::vtu::NumberPoints;
 use tetralod::mesh::TetMesh;
 
 /// A file.
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     file: &'a NcFile,
     root: &'a NcGroup,
     /// The variables of the root, by their names: there may be one for each variable of each block.
     variables: HashMap<&'a str, &'a NcVariable>,
-    step: u64,
+    pub times: Vec<f64>,
+    options: &'a ReadOptions,
 }
 
 /// A block of elements that have a volume.
@@ -31,49 +34,128 @@ struct Block {
     /// From 1, in the names of arrays.
     number: usize,
     elements: usize,
+    /// How many elements the blocks before it have.
+    before: usize,
 }
+
+/// What blocks are called, by their numbers.
+pub(super) type BlockNames = BTreeMap<i64, String>;
 
 /// The times of the steps; none if there are no steps.
 pub(super) fn times(file: &NcFile) -> Result<Vec<f64>, ReadError> {
-    let reader = Reader::new(file, 0).at(String::new)?;
-    let times = reader.values_if("time_whole").and_then(|times| checked_times(times.unwrap_or_default()));
-    times.at(|| "time_whole".into())
+    Ok(Reader::new(file, &ReadOptions::default())?.times)
 }
 
 /// Reads a mesh.
 pub(super) fn read(file: &NcFile, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let times = times(file)?;
-    options.expect_step(times.len()).at(String::new)?;
-    let reader = Reader::new(file, options.step as u64).at(String::new)?;
-    let mut draft = Draft::new(options);
-    draft.coordinates = reader.coordinates().at(|| "coordinates".into())?;
-    let blocks = reader.blocks(&mut draft)?;
-    if !times.is_empty() {
-        reader.variables_at_nodes(&mut draft)?;
-        reader.variables_at_elements(&blocks, &mut draft)?;
-    }
-    let numbers = reader.numbers_of_blocks(&blocks).at(|| "eb_prop1".into())?;
-    let of_blocks = || blocks.iter().zip(&numbers);
-    let of_elements = of_blocks().flat_map(|(block, number)| std::iter::repeat_n(*number, block.elements));
-    draft.at_cells("block", 1, true, || Ok(of_elements.collect())).at(|| "eb_prop1".into())?;
-    let mut mesh = draft.finish().at(|| "element blocks".into())?;
-    // What cannot be read of them is no part of the mesh.
-    let names = reader.names("eb_names").unwrap_or_default();
-    for (block, number) in of_blocks() {
-        let name = names.get(block.number.wrapping_sub(1)).map_or("", String::as_str);
-        mesh.input.name_label("block", *number as i64, name);
-    }
-    let time = times.get(options.step).copied();
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
-    Ok(mesh)
+    let numbers: NumberPoints<'_> = &mut |points| Ok(Numbering::From { first: 0, points: points.len() });
+    Reader::new(file, options)?.mesh(numbers, &mut BlockNames::new())
 }
 
 impl<'a> Reader<'a> {
-    fn new(file: &'a NcFile, step: u64) -> Result<Self, ReadReason> {
-        let root = file.root_group().map_err(netcdf_reason)?;
+    pub fn new(file: &'a NcFile, options: &'a ReadOptions) -> Result<Self, ReadError> {
+        let root = file.root_group().map_err(netcdf_reason).at(String::new)?;
         // The first one of a name counts.
         let variables = root.variables.iter().rev().map(|variable| (variable.name(), variable)).collect();
-        Ok(Self { file, root, variables, step })
+        let mut reader = Self { file, root, variables, times: Vec::new(), options };
+        let times = reader.values_if("time_whole").and_then(|times| checked_times(times.unwrap_or_default()));
+        reader.times = times.at(|| "time_whole".into())?;
+        Ok(reader)
+    }
+
+    /// The same with other options.
+    pub fn with<'b>(&self, options: &'b ReadOptions) -> Reader<'b>
+    where
+        'a: 'b,
+    {
+        Reader { variables: self.variables.clone(), times: self.times.clone(), options, ..*self }
+    }
+
+    /// The mesh, whose points are numbered as `numbers` says. Blocks have the numbers that `known` has for their names, which learns new ones.
+    pub fn mesh(&self, numbers: NumberPoints<'_>, known: &mut BlockNames) -> Result<TetMesh, ReadError> {
+        let Self { options, times, .. } = self;
+        options.expect_step(times.len()).at(String::new)?;
+        let mut draft = Draft::new(options);
+        draft.coordinates = self.coordinates().at(|| "coordinates".into())?;
+        let blocks = self.blocks(&mut draft)?;
+        if !times.is_empty() {
+            self.variables_at_nodes(&mut draft)?;
+            self.variables_at_elements(&blocks, &mut draft)?;
+        }
+        let of_blocks = self.numbers_of_blocks(&blocks, known).at(|| "eb_prop1".into())?;
+        let of_blocks = || blocks.iter().zip(&of_blocks);
+        let of_elements =
+            of_blocks().flat_map(|(block, number)| std::iter::repeat_n(*number, block.elements));
+        draft.at_cells("block", 1, true, || Ok(of_elements.collect())).at(|| "eb_prop1".into())?;
+        let own = self.numbers_of_elements(&blocks);
+        let finished = match &own {
+            None => draft.finish_numbered(numbers).at(|| "element blocks".into()),
+            Some(own) => draft
+                .finish_numbered(numbers)
+                .map_err(|reason| {
+                    reason.with_cell(|cell| own.get(cell as usize).map_or(cell, |own| (*own).into()))
+                })
+                .at(|| "element blocks, numbered by elem_num_map".into()),
+        };
+        let mut mesh = finished?;
+        mesh.input.cells.number_cells(own.unwrap_or_default());
+        for (_, number) in of_blocks() {
+            let name = known.get(&(*number as i64)).map_or("", String::as_str);
+            mesh.input.name_label("block", *number as i64, name);
+        }
+        let time = times.get(options.step).copied();
+        mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+        Ok(mesh)
+    }
+
+    /// How many points there are, and elements of each of VTK's types that have a volume; none of those if that takes more than their types.
+    pub fn counts(&self) -> Result<(u64, Option<BTreeMap<i64, u64>>), ReadError> {
+        let points = self.root.dimension("num_nodes").map_or(0, |dimension| dimension.size);
+        let mut counts = BTreeMap::new();
+        for number in self.numbers_behind("connect") {
+            let name = format!("connect{number}");
+            let (element, _) = self.element(&name).at(|| name.clone())?;
+            if let Element::Solid(kind, _) = element {
+                let elements = self.variable(&name).at(String::new)?.shape().first().copied().unwrap_or(0);
+                *counts.entry(kind).or_insert(0_u64) += elements;
+            }
+        }
+        Ok((points, Some(counts).filter(|_| self.numbers_behind("facconn").is_empty())))
+    }
+
+    /// How many fields at points the variables become that are wanted.
+    pub fn count_fields(&self) -> Result<u64, ReadError> {
+        let place = || "name_nod_var".to_owned();
+        let names = if self.times.is_empty() { Vec::new() } else { self.names("name_nod_var").at(place)? };
+        let mut collector = Collector::new(self.options);
+        for (name, parts) in joined(&names) {
+            if let Some(claim) = collector.claim(&name, parts.len()).at(place)? {
+                collector.keep_names(claim, "");
+            }
+        }
+        Ok(collector.fields.len() as u64)
+    }
+
+    /// The numbers of the nodes in the whole that this file is a piece of, if it says so.
+    pub fn numbers_of_nodes(&self) -> Result<Option<Vec<i64>>, ReadReason> {
+        let Some(numbers) = self.values_if("node_num_map")? else { return Ok(None) };
+        let numbers: Vec<i64> = numbers.into_iter().map(|number| number as i64).collect();
+        let mut sorted = numbers.clone();
+        sorted.sort_unstable();
+        if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(ReadReason::Syntax(format!("node {} is there twice", pair[0])));
+        }
+        Ok(Some(numbers))
+    }
+
+    /// What users number the elements of blocks with, if the file says so.
+    fn numbers_of_elements(&self, blocks: &[Block]) -> Option<Vec<u32>> {
+        // What cannot be read of them is no part of the mesh.
+        let known = self.values_if("elem_num_map").ok()??;
+        let of_block = |block: &Block| known.get(block.before..block.before + block.elements);
+        let all = blocks.iter().map(of_block).collect::<Option<Vec<_>>>()?;
+        let number = |x: &f64| Some(*x as u32).filter(|number| f64::from(*number) == *x);
+        all.concat().iter().map(number).collect()
     }
 
     fn has(&self, name: &str) -> bool {
@@ -114,7 +196,8 @@ impl<'a> Reader<'a> {
         self.has(name).then(|| self.values(name, &[])).transpose()
     }
 
-    fn coordinates(&self) -> Result<Vec<f64>, ReadReason> {
+    /// The coordinates of all points, of one point behind the other.
+    pub fn coordinates(&self) -> Result<Vec<f64>, ReadReason> {
         let axes = self.size("num_dim")?;
         if axes != 3 {
             let what = format!("a mesh in {axes} dimensions");
@@ -142,15 +225,19 @@ impl<'a> Reader<'a> {
         let mut numbers: Vec<_> =
             ordinary.chain(polyhedra.into_iter().map(|number| (number, "facconn"))).collect();
         numbers.sort_unstable();
-        let mut blocks = Vec::new();
+        let (mut blocks, mut before) = (Vec::new(), 0);
         for (number, start) in numbers {
             let name = format!("{start}{number}");
+            let cells = draft.cells();
             let elements = if start == "connect" {
                 self.block(&name, draft).at(|| name.clone())?
             } else {
-                Some(self.polyhedra(number, &mut faces, draft).at(|| name.clone())?)
+                self.polyhedra(number, &mut faces, draft).at(|| name.clone())?
             };
-            blocks.extend(elements.map(|elements| Block { number, elements }));
+            if draft.cells() > cells {
+                blocks.push(Block { number, elements, before });
+            }
+            before += elements;
         }
         Ok(blocks)
     }
@@ -211,8 +298,8 @@ impl<'a> Reader<'a> {
         Ok(lists.ends.len())
     }
 
-    /// Reads a block; returns how many elements it has, or none if they have no volume.
-    fn block(&self, name: &str, draft: &mut Draft<'_>) -> Result<Option<usize>, ReadReason> {
+    /// What the elements of a block are, and how many points each has.
+    fn element(&self, name: &str) -> Result<(Element, usize), ReadReason> {
         let variable = self.variable(name)?;
         let kind = variable.attribute("elem_type").and_then(|kind| kind.value.as_string());
         let kind = kind.ok_or_else(|| ReadReason::Missing("attribute elem_type".into()))?;
@@ -225,25 +312,56 @@ impl<'a> Reader<'a> {
                 "save the mesh with tetrahedra, hexahedra, wedges and pyramids of the first or second order",
             )
         };
-        let Element::Solid(cell, order) = element(kind, points).ok_or_else(unknown)? else { return Ok(None) };
+        Ok((element(kind, points).ok_or_else(unknown)?, points))
+    }
+
+    /// Reads a block, if its elements have a volume; returns how many it has.
+    fn block(&self, name: &str, draft: &mut Draft<'_>) -> Result<usize, ReadReason> {
+        let (element, points) = self.element(name)?;
+        let Element::Solid(cell, order) = element else {
+            let elements = self.variable(name)?.shape().first().copied().unwrap_or(0);
+            return Ok(usize::try_from(elements).unwrap_or(usize::MAX));
+        };
         let list = self.values(name, &[])?;
         for of_element in list.chunks_exact(points) {
             // They are numbered from 1.
             draft.add_cell(cell, order.iter().map(|&p| (of_element[p] as i64).saturating_sub(1)));
         }
-        Ok(Some(list.len() / points))
+        Ok(list.len() / points)
     }
 
-    /// The numbers of blocks, by which users know them.
-    fn numbers_of_blocks(&self, blocks: &[Block]) -> Result<Vec<f64>, ReadReason> {
-        let known = self.values_if("eb_prop1")?.unwrap_or_default();
-        let number =
-            |block: &Block| known.get(block.number.wrapping_sub(1)).copied().unwrap_or(block.number as f64);
-        Ok(blocks.iter().map(number).collect())
+    /// The numbers of blocks, by which users know them. A block of another piece has its number there.
+    fn numbers_of_blocks(&self, blocks: &[Block], known: &mut BlockNames) -> Result<Vec<f64>, ReadReason> {
+        let stated = self.values_if("eb_prop1")?.unwrap_or_default();
+        // What cannot be read of them is no part of the mesh.
+        let names = self.names("eb_names").unwrap_or_default();
+        let earlier = known.clone();
+        let mut numbers = Vec::with_capacity(blocks.len());
+        for block in blocks {
+            let at = block.number.wrapping_sub(1);
+            let mut number = stated.get(at).copied().unwrap_or(block.number as f64);
+            if let Some(name) = names.get(at).filter(|name| !name.is_empty()) {
+                let other = earlier.get(&(number as i64)).filter(|other| *other != name);
+                match earlier.iter().find(|(_, earlier)| *earlier == name) {
+                    Some((there, _)) if !earlier.contains_key(&(number as i64)) || other.is_some() => {
+                        number = *there as f64;
+                    }
+                    None if let Some(other) = other => {
+                        let what = format!(
+                            "block {number} is called \"{name}\", but \"{other}\" in an earlier piece"
+                        );
+                        return Err(ReadReason::Syntax(what));
+                    }
+                    _ => drop(known.insert(number as i64, name.clone())),
+                }
+            }
+            numbers.push(number);
+        }
+        Ok(numbers)
     }
 
     /// The names in an array of text.
-    fn names(&self, name: &str) -> Result<Vec<String>, ReadReason> {
+    pub fn names(&self, name: &str) -> Result<Vec<String>, ReadReason> {
         if !self.has(name) {
             return Ok(Vec::new());
         }
@@ -260,9 +378,9 @@ impl<'a> Reader<'a> {
             let read = |part: usize| {
                 // Old files have one array.
                 let values = if self.has("vals_nod_var") {
-                    self.values("vals_nod_var", &[self.step, part as u64])?
+                    self.values("vals_nod_var", &[self.options.step as u64, part as u64])?
                 } else {
-                    self.values(&format!("vals_nod_var{}", part + 1), &[self.step])?
+                    self.values(&format!("vals_nod_var{}", part + 1), &[self.options.step as u64])?
                 };
                 expect(points, values)
             };
@@ -281,7 +399,10 @@ impl<'a> Reader<'a> {
                 for block in blocks {
                     let array = format!("vals_elem_var{}eb{}", part + 1, block.number);
                     if self.has(&array) {
-                        values.extend(expect(block.elements, self.values(&array, &[self.step])?)?);
+                        values.extend(expect(
+                            block.elements,
+                            self.values(&array, &[self.options.step as u64])?,
+                        )?);
                     } else {
                         values.resize(values.len() + block.elements, 0.0);
                     }

@@ -5,15 +5,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use hdf5_reader::error::Error;
 use hdf5_reader::storage::DynStorage;
 use hdf5_reader::{BlockCacheStorage, BytesStorage, FileStorage, Hdf5File, OpenOptions};
 use netcdf_reader::{NcFile, NcOpenOptions};
 
 use crate::beside::{FilesOf, Source};
-use crate::error::{At, ReadError, in_file};
+use crate::error::{At, ReadError, ReadReason, in_file};
+use crate::formats::exodus_pieces::Decomposition;
 use crate::formats::hdf5_values::{netcdf_reason, reason};
 use crate::formats::{exodus, vtkhdf};
-use crate::{ReadOptions, foreign};
+use crate::{MemoryLimit, ReadOptions, foreign};
 use tetralod::mesh::TetMesh;
 
 /// The first bytes of HDF5 files.
@@ -60,22 +62,56 @@ fn open(files: &FilesOf<'_>) -> Option<DynStorage> {
         return None;
     }
     Some(match files.source {
-        Source::Disk => {
-            Arc::new(BlockCacheStorage::with_defaults(Arc::new(FileStorage::open(files.given).ok()?)))
-        }
+        Source::Disk => open_on_disk(files.given).ok()?,
         Source::Memory(in_memory, given) => Arc::new(BytesStorage::from_owner(in_memory.shared(given))),
         Source::Bytes(bytes) => Arc::new(BytesStorage::new(bytes.to_vec())),
     })
 }
 
+/// The file at a path, whatever it is.
+pub(super) fn open_on_disk(path: &Path) -> Result<DynStorage, Error> {
+    Ok(Arc::new(BlockCacheStorage::with_defaults(Arc::new(FileStorage::open(path)?))))
+}
+
+/// Whether the file at a path begins as one of these.
+pub(super) fn is_known_file(path: &Path) -> bool {
+    is_known(&FilesOf::on_disk(path, &MemoryLimit::default()).head(HDF5.len()))
+}
+
+/// Whether the given file is one of these, and not VTKHDF. What is wrong with it is for its reader to say.
+pub(super) fn is_exodus(files: &FilesOf<'_>) -> bool {
+    open(files).is_some_and(|storage| !matches!(content(storage, u64::MAX), Ok(Content::Vtkhdf(_))))
+}
+
+/// Opens a piece of a mesh.
+pub(super) fn exodus_in(storage: DynStorage, options: &ReadOptions) -> Result<NcFile, ReadError> {
+    match content(storage, options.memory.most())? {
+        Content::Exodus(file) => Ok(file),
+        Content::Vtkhdf(_) => {
+            let what = "a piece in VTKHDF among those of Exodus";
+            Err(ReadReason::unsupported(what, "give each its own name")).at(String::new)
+        }
+    }
+}
+
 /// Reads the given file if it is one of these; others are for other readers, and so is one that cannot be opened.
 pub(crate) fn read_given(files: &FilesOf<'_>, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
-    let result = read_from(open(files)?, options);
+    let result = match Decomposition::of(files) {
+        Ok(None) => read_from(open(files)?, options),
+        Ok(Some(pieces)) => {
+            pieces.names().for_each(|file| files.note(file));
+            pieces.read(options)
+        }
+        Err(error) => Err(error),
+    };
     Some(result.map_err(|error| in_file(error, &files.name())))
 }
 
 /// The times of the steps in the given file; none if it is not one of these, or has no steps.
 pub(crate) fn times(files: &FilesOf<'_>) -> Result<Vec<f64>, ReadError> {
+    if let Some(pieces) = Decomposition::of(files)? {
+        return pieces.times();
+    }
     let Some(storage) = open(files) else { return Ok(Vec::new()) };
     let times = content(storage, u64::MAX).and_then(|content| match content {
         Content::Vtkhdf(file) => vtkhdf::times(&file),

@@ -7,6 +7,8 @@ mod draft;
 mod exodus;
 #[cfg(feature = "hdf5")]
 mod exodus_cells;
+#[cfg(feature = "hdf5")]
+pub(super) mod exodus_pieces;
 mod gmsh;
 mod gmsh_cells;
 mod gmsh_layout;
@@ -135,6 +137,16 @@ pub(super) fn named_by(name: &str, bytes: &[u8]) -> Vec<String> {
         Some(Format::MetaImage) => metaimage::named_by(bytes),
         Some(Format::Gmsh | Format::Netgen) | None => Vec::new(),
     }
+}
+
+/// The names of the other pieces, if this is the first one of a mesh in several files.
+pub(super) fn pieces_beside(name: &str, bytes: &[u8]) -> Option<Vec<String>> {
+    #[cfg(feature = "hdf5")]
+    if hdf5::name(bytes) == Some("exodus") {
+        return exodus_pieces::beside_first(name);
+    }
+    let _ = (name, bytes);
+    None
 }
 
 /// The name of the file beside the one called `name` that has another ending.

@@ -21,7 +21,7 @@ use crate::grid_parts::cubes_of;
 use crate::number::points_from;
 use crate::numbering::Numbering;
 use crate::polyhedra::{FaceLists, SharedFaces};
-use crate::pvtu::Whole;
+use crate::pvtu::{Identity, Whole};
 use crate::vtu::{NumberPoints, first_number};
 use crate::{CellData, ReadOptions};
 use tetralod::mesh::{Field, MeshInput, TetMesh};
@@ -187,7 +187,7 @@ impl Reader<'_> {
         let mut whole = Whole::default();
         for (number, piece) in pieces.iter().enumerate() {
             let place = || format!("piece {number}, {ROOT}/PointData");
-            whole.add(&mut |numbers| self.piece(piece, number, numbers), &place)?;
+            whole.add(Identity::Places, &mut |numbers| self.piece(piece, number, numbers), &place)?;
         }
         Ok(whole.mesh)
     }

@@ -12,6 +12,7 @@ use crate::formats::hdf5_values::{floats, integers, row_length};
 use crate::formats::vtkhdf::{Piece, ROOT, Reader, UNSTRUCTURED};
 use crate::ghosts::GHOST_TYPE;
 use crate::number::points_from;
+use crate::pvtu::{Identity, bits};
 use crate::ranges::{Before, Grid, InPieces, Ranges, Rows};
 use crate::shared_points::{SharedPoints, hash};
 use crate::{PieceCounts, ReadOptions};
@@ -78,14 +79,15 @@ impl HdfFile {
             let options = &afresh();
             let (reader, ..) = Reader::of(&self.file, options)?;
             let points = reader.positions(piece).at(|| format!("piece {number}, {ROOT}/Points"))?;
-            hashes.extend(points.into_iter().map(hash));
+            hashes.extend(points.into_iter().map(bits).map(hash));
         }
         let mut shared = SharedPoints::of(hashes);
         for (number, piece) in self.pieces.iter().enumerate() {
             let options = &afresh();
             let (reader, _, time) = Reader::of(&self.file, options)?;
             let place = || format!("piece {number}, PointData");
-            let mut piece = shared.read(&mut |numbers| reader.piece(piece, number, numbers), &place)?;
+            let mut piece =
+                shared.read(Identity::Places, &mut |numbers| reader.piece(piece, number, numbers), &place)?;
             set_time(&mut piece.mesh, time);
             each(piece)?;
         }

@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 
+use crate::exodus::{Values, Variable, netcdf};
 use tetralod::mesh::{Field, TetMesh};
 use tetralod_io::{self as io, CellData, FieldSelection, ReadError, ReadOptions, ReadReason};
 
@@ -243,21 +244,6 @@ fn counts_that_lie_do_not_size_anything() {
     }
 }
 
-/// A variable of a netCDF file: its name, its dimensions, an attribute of text, and its values.
-struct Variable {
-    name: String,
-    dimensions: Vec<&'static str>,
-    kind: &'static str,
-    values: Values,
-}
-
-enum Values {
-    Text(Vec<u8>),
-    Integers(Vec<i32>),
-    /// Of each record one list, or one for all.
-    Floats(Vec<Vec<f64>>),
-}
-
 /// A cube and a pyramid on it at two times, with a shell beside them, in netCDF of version 1 (classic), 2 or 5.
 fn exodus(version: u8) -> Vec<u8> {
     let points = [
@@ -391,71 +377,4 @@ fn polyhedra_of_exodus_share_faces() {
         let error = io::read_bytes("a.exo", &exodus_polyhedra(change)).unwrap_err();
         assert!(!matches!(error.reason, ReadReason::Io(_)), "{variable} {wrong}: {error}");
     }
-}
-
-/// A file in classic netCDF: its header twice, as the first one does not know where the data begins.
-fn netcdf(version: u8, dimensions: &[(&str, u64)], variables: &[Variable], records: u64) -> Vec<u8> {
-    let header = |begins: &[u64]| {
-        let count = |number: u64| {
-            if version == 5 { number.to_be_bytes().to_vec() } else { (number as u32).to_be_bytes().to_vec() }
-        };
-        let offset = |number: u64| if version == 1 { count(number) } else { number.to_be_bytes().to_vec() };
-        let padded = |bytes: &[u8]| [bytes, &vec![0; bytes.len().next_multiple_of(4) - bytes.len()]].concat();
-        let name = |name: &str| [count(name.len() as u64), padded(name.as_bytes())].concat();
-        let tag = |tag: u32, length: usize| [tag.to_be_bytes().to_vec(), count(length as u64)].concat();
-        let mut bytes = [b"CDF", &[version][..], &count(records)].concat();
-        bytes.extend(tag(10, dimensions.len()));
-        for (text, size) in dimensions {
-            bytes.extend([name(text), count(*size)].concat());
-        }
-        bytes.extend([tag(0, 0), tag(11, variables.len())].concat());
-        for (variable, begin) in variables.iter().zip(begins) {
-            bytes.extend([name(&variable.name), count(variable.dimensions.len() as u64)].concat());
-            let number = |of: &str| dimensions.iter().position(|(text, _)| *text == of).unwrap() as u64;
-            bytes.extend(variable.dimensions.iter().flat_map(|of| count(number(of))));
-            if variable.kind.is_empty() {
-                bytes.extend(tag(0, 0));
-            } else {
-                let text = [2_u32.to_be_bytes().to_vec(), name(variable.kind)].concat();
-                bytes.extend([tag(12, 1), name("elem_type"), text].concat());
-            }
-            let (kind, size) = match &variable.values {
-                Values::Text(text) => (2_u32, text.len()),
-                Values::Integers(list) => (4, 4 * list.len()),
-                Values::Floats(rows) => (6, 8 * rows[0].len()),
-            };
-            bytes.extend(
-                [kind.to_be_bytes().to_vec(), count(size.next_multiple_of(4) as u64), offset(*begin)]
-                    .concat(),
-            );
-        }
-        bytes
-    };
-    let part = |variable: &Variable, record: usize| {
-        let mut bytes: Vec<u8> = match &variable.values {
-            Values::Text(text) => text.clone(),
-            Values::Integers(list) => list.iter().flat_map(|number| number.to_be_bytes()).collect(),
-            Values::Floats(rows) => rows[record].iter().flat_map(|number| number.to_be_bytes()).collect(),
-        };
-        bytes.resize(bytes.len().next_multiple_of(4), 0);
-        bytes
-    };
-    let is_record = |variable: &&Variable| variable.dimensions.first() == Some(&"time_step");
-    let mut data = Vec::new();
-    let mut begins = vec![0; variables.len()];
-    let start = header(&begins).len() as u64;
-    for record in 0..=records as usize {
-        for (begin, variable) in begins.iter_mut().zip(variables) {
-            // First what has no records, then the records one by one.
-            match (is_record(&variable), record) {
-                (false, 0) | (true, 1) => *begin = start + data.len() as u64,
-                (false, _) | (true, 0) => {}
-                _ => {}
-            }
-            if is_record(&variable) == (record > 0) {
-                data.extend(part(variable, record.saturating_sub(1)));
-            }
-        }
-    }
-    [header(&begins), data].concat()
 }

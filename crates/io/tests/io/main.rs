@@ -6,6 +6,11 @@ mod damaged;
 #[path = "../../../../tests/support/data.rs"]
 mod data;
 mod encodings;
+#[cfg(feature = "hdf5")]
+#[path = "../../../../tests/support/exodus.rs"]
+mod exodus;
+#[cfg(all(feature = "hdf5", not(target_arch = "wasm32")))]
+mod exodus_pieces;
 mod fields;
 mod files;
 #[cfg(feature = "hdf5")]
