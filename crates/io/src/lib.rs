@@ -17,7 +17,7 @@
 //! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal | |
 //! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text | |
 //! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; `hdf5` | |
-//! | Exodus II | `.exo`, `.ex2`, `.e` | `hdf5` | |
+//! | Exodus II | `.exo`, `.ex2`, `.e` | in one file, or in pieces (`.e.4.0`); `hdf5` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |
