@@ -148,9 +148,10 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
         let way = match arguments.parts {
             Some(count) => Way::Parts(count),
             None => {
-                let PieceCounts { points, tetrahedra, pieces, largest, fields } = input.pieces.counts()?;
+                let PieceCounts { points, tetrahedra, largest, fields, meeting, .. } =
+                    input.pieces.counts()?;
                 let fields = if config.all_fields { fields } else { (config.fields.len() as u64).max(1) };
-                way(&arguments.asked(), config, [points, tetrahedra, fields], Some([pieces, largest]))?
+                way(&arguments.asked(), config, [points, tetrahedra, fields], Some([meeting, largest]))?
             }
         };
         let Way::Parts(count) = way else { return Ok(None) };

@@ -41,7 +41,7 @@ pub(super) struct Asked<'a> {
 
 /// Says how much memory building takes where that is much, and chooses how to keep to what is allowed.
 ///
-/// Of a mesh of so many points, tetrahedra and fields; if it comes in pieces, there are so many, and the largest one has so many
+/// Of a mesh of so many points, tetrahedra and fields; if it comes in pieces, so many points are in several, and the largest one has so many
 /// tetrahedra.
 pub(super) fn way(
     asked: &Asked<'_>,
@@ -102,7 +102,7 @@ fn disk_in_parts([points, tetrahedra, fields]: [u64; 3]) -> u64 {
 /// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are
 /// threads; none if it is not.
 ///
-/// If it comes in pieces, there are so many, and the largest one has so many tetrahedra.
+/// If it comes in pieces, so many points are in several, and the largest one has so many tetrahedra.
 fn count_for(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>, most: u64) -> Option<u32> {
     memory_in_parts(config, counts, pieces).into_iter().find(|&(_, needed)| needed <= most).map(|(n, _)| n)
 }

@@ -175,7 +175,7 @@ fn pieces_are_built_as_their_whole() {
         text(&output.stderr).to_owned()
     };
     let tetrahedra = plan["tetrahedra"].as_u64().expect("a number");
-    let said_parts = said(&["--memory", &(170 * tetrahedra).to_string()]);
+    let said_parts = said(&["--memory", &(179 * tetrahedra).to_string()]);
     assert!(said_parts.contains("so it is built in"), "{said_parts}");
     bad(1, &[&parts[..], &["--memory", "200K"]].concat(), &["more than --memory allows"]);
     // What the pieces do not tell one by one is told by the whole.

@@ -58,4 +58,28 @@ pub struct PieceCounts {
     pub largest: u64,
     /// Fields at points.
     pub fields: u64,
+    /// Points that several pieces have, about.
+    pub meeting: u64,
 }
+
+impl PieceCounts {
+    /// As of pieces that are as long as they are wide: of the six sides of each, two of them share one.
+    pub(super) fn in_boxes(mut self) -> Self {
+        let side = libm::cbrt(self.points as f64 / self.pieces.max(1) as f64);
+        let sides = if self.pieces > 1 { 3.0 * self.pieces as f64 * side * side } else { 0.0 };
+        self.meeting = self.points.min(sides as u64);
+        self
+    }
+
+    /// As of ranges of cells, which are layers of a volume: each has as many in common with the next one as the volume is wide. The most
+    /// that was measured, in layers around a hole.
+    pub(super) fn in_layers(mut self) -> Self {
+        let side = libm::cbrt(self.points as f64);
+        let between = self.pieces.saturating_sub(1) as f64;
+        self.meeting = self.points.min((WIDTH_OF_LAYERS * between * side * side) as u64);
+        self
+    }
+}
+
+/// Points of a layer that are in the next one, for each of the side of a cube of as many points.
+const WIDTH_OF_LAYERS: f64 = 1.85;

@@ -130,7 +130,7 @@ impl Pieces {
             })
         });
         counted.map_err(|error| self.named(error))?;
-        Ok(counts)
+        Ok(counts.in_boxes())
     }
 
     /// Reads one piece after the other, and passes it on. Together they are the mesh that [`read_with`](super::read_with) reads.

@@ -160,7 +160,7 @@ impl Ranges {
 /// So many tetrahedra a range take the least memory, of so many in all: ranges that are layers of a volume have as many points in common
 /// as the layer has on its sides, and each of these takes as much as some tetrahedra of a range.
 fn balanced(all: u64) -> u64 {
-    let ranges = 0.67 * libm::pow(all as f64, 1.0 / 6.0);
+    let ranges = 0.4 * libm::pow(all as f64, 1.0 / 6.0);
     LEAST_TETS.max((all as f64 / ranges) as u64)
 }
 

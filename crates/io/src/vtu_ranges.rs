@@ -149,13 +149,15 @@ impl VtuFile {
 
 impl InPieces for VtuFile {
     fn counts(&self) -> PieceCounts {
-        PieceCounts {
+        let counts = PieceCounts {
             points: self.points,
             tetrahedra: self.pieces.iter().map(|piece| piece.tets).sum(),
             pieces: self.ranges().count() as u64,
             largest: self.pieces.iter().map(|piece| piece.largest).max().unwrap_or(0),
             fields: self.fields,
-        }
+            ..PieceCounts::default()
+        };
+        counts.in_layers()
     }
 
     fn for_each(

@@ -394,7 +394,8 @@ mod tests {
     #[test]
     fn more_is_refused_before_anything_else() {
         for dims in [[1024; 3], [896; 3], [1625; 3], [2, 1 << 15, 1 << 15]] {
-            let refused = GridCut::new(&alone(dims), &BuildConfig::default(), 64);
+            let (mesh, config) = (alone(dims), BuildConfig::default());
+            let refused = GridCut::new(&mesh, &config, 64);
             assert!(matches!(refused.err(), Some(PartsError::Build(BuildError::TooLarge))), "{dims:?}");
         }
     }

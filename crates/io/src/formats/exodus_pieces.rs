@@ -304,7 +304,7 @@ impl ExodusPieces {
         })?;
         match why {
             Some(why) => Err(Stop::Whole(why)),
-            None => Ok((counts.pieces > 1).then_some(Self { decomposition, counts })),
+            None => Ok((counts.pieces > 1).then(|| Self { decomposition, counts: counts.in_boxes() })),
         }
     }
 }

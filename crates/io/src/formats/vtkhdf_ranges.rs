@@ -63,6 +63,7 @@ impl HdfFile {
             HdfGrid { reader: &reader, piece, number: 0 }.check()?;
         }
         counts.pieces = ranges.len() as u64;
+        let counts = if pieces.len() > 1 { counts.in_boxes() } else { counts.in_layers() };
         drop(reader);
         Ok((ranges.len() > 1).then_some(Self { file, pieces, ranges, counts }))
     }
