@@ -18,6 +18,9 @@ pub struct Sharding {
     shard_size: Option<u64>,
 }
 
+/// Bytes with which an MT file says how many it has.
+const START: u64 = 24;
+
 /// Shards at most: up to here their names are in their order.
 const MOST: u64 = 10_000;
 
@@ -87,6 +90,12 @@ fn place(from: &Path, to: &Path, left_over: Range<u64>) -> io::Result<()> {
         fs::rename(shard(from, number), shard(to, number))?;
     }
     remove_all(to, left_over)
+}
+
+/// Whether the MT file at a path has all bytes that it says it has, without shards.
+pub fn is_whole(path: &Path) -> bool {
+    let has_start = fs::metadata(path).is_ok_and(|found| found.len() >= START);
+    has_start && older_shards(path) == 1
 }
 
 /// In how many shards the MT file at a path is; 1 if there is none.

@@ -2,8 +2,8 @@
 //! down of them. Where a mesh is to be parted later, that is one task, before all others are known.
 
 use super::request::{Awaited, REQUEST, Request};
-use crate::files;
 use crate::parts::{Folder, PLAN, command_for};
+use crate::{files, shards};
 use anyhow::{Context, Result, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -207,7 +207,16 @@ impl Tasks {
     /// If that is damaged, or of another plan.
     pub fn is_done(&self, task: Node) -> Result<bool> {
         let path = self.result(task);
-        let Some(plan) = self.plan().filter(|_| task != self.last()) else { return Ok(path.exists()) };
+        let Some(plan) = self.plan().filter(|_| task != self.last()) else {
+            let is_there = path.exists();
+            ensure!(
+                !is_there || !self.are_planned() || shards::is_whole(&path),
+                "{} is cut off: remove it, and `tetralod work {}` writes it again",
+                path.display(),
+                self.folder.display()
+            );
+            return Ok(is_there);
+        };
         let file = match File::open(&path) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
             file => file.with_context(|| path.display().to_string())?,

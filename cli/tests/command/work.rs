@@ -161,6 +161,12 @@ fn what_is_lost_or_damaged_is_made_again_or_named() {
         assert_eq!(parted.work(&[])["tasks"], 2);
         parted.assert_built("after damage");
     }
+    // So is the file.
+    for cut in [parted.file.len() - 1, 3] {
+        fs::write(&mt, &parted.file[..cut]).expect("a file");
+        bad(1, &work, &["built.mt is cut off: remove it, and `tetralod work"]);
+    }
+    fs::write(&mt, &parted.file).expect("a file");
     // One with other bytes is found when it is read.
     remove(&["built.mt", "built-1-0.part"]);
     let mut other = whole.clone();
