@@ -432,6 +432,13 @@ pub fn scheme(path: &Path) -> Option<&str> {
     Some(scheme).filter(|_| is_scheme && !path.exists())
 }
 
+/// Whether a path is the address of a Zarr array or group on a server: one in or below what is called `.zarr`, or without an ending.
+pub fn is_zarr_address(path: &Path) -> bool {
+    let is_known = scheme(path).is_some_and(|scheme| ["http", "https", "s3"].contains(&scheme));
+    let is_zarr = |part: &std::ffi::OsStr| ending(Path::new(part)) == "zarr";
+    is_known && (path.iter().any(is_zarr) || path.extension().is_none())
+}
+
 /// Opens an MT file of which only what is needed is read.
 pub fn open_parts(path: &Path) -> Result<Client<Bytes>> {
     Ok(Client::open(Bytes::of(path)?, DecodeOptions::default(), u64::MAX)?)

@@ -103,8 +103,8 @@ pub fn say_notes(notes: &[String], path: &Path) {
 fn steps(paths: &[PathBuf]) -> Result<Vec<Step>> {
     let mut steps = Vec::new();
     for path in paths {
-        if let Some(scheme) = files::scheme(path) {
-            bail!("{}: meshes are not read by {scheme}; fetch the file first", path.display());
+        if let Some(scheme) = files::scheme(path).filter(|_| !files::is_zarr_address(path)) {
+            bail!("{}: meshes are not read by {scheme}, but for Zarr; fetch the file first", path.display());
         }
         // Read errors name the file themselves.
         steps.extend(io::steps(path)?);

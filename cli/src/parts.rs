@@ -18,9 +18,11 @@ use std::sync::{Mutex, PoisonError};
 use tetralod::format::BlockEncoder;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
-use tetralod_build::parts::{self, Assembled, Node, Part, PartUpdates, PartsError, Piecewise, Plan};
+use tetralod_build::parts::{
+    self, Assembled, GridValues, Node, Part, PartUpdates, PartsError, Piecewise, Plan, PointBox,
+};
 use tetralod_build::{BuildConfig, BuildProgress, BuildResult, BuildSummary, OnProgress};
-use tetralod_io::Pieces;
+use tetralod_io::{GridInParts, Pieces};
 
 /// Parses `I/N`: a part and how many there are.
 pub fn of_all(text: &str) -> Result<[u32; 2]> {
@@ -99,6 +101,9 @@ impl Folder<'_> {
         count: u32,
         metadata: BTreeMap<String, String>,
     ) -> Result<Result<Plan, PartsError>> {
+        if let Some(grid) = input.pieces.grid() {
+            return self.part_grid((input, grid), config, count, metadata);
+        }
         // Beside the parts, and gone afterwards.
         files::in_folder_beside(&self.0.join("pieces"), |folder| {
             let scratch = ScratchFolder(folder);
@@ -121,6 +126,28 @@ impl Folder<'_> {
                 },
             }
         })
+    }
+
+    /// Parts a grid of which boxes are read.
+    fn part_grid(
+        &self,
+        (input, grid): (&InPieces<'_>, &GridInParts),
+        config: &BuildConfig,
+        count: u32,
+        metadata: BTreeMap<String, String>,
+    ) -> Result<Result<Plan, PartsError>> {
+        let read = |field: usize, points: PointBox| {
+            grid.values(field, points).map_err(|error| PartsError::other(input.pieces.named(error)))
+        };
+        let values = GridValues { mesh: grid.mesh().clone(), layers: grid.layers(), read: &read };
+        let prepare = |mesh: &mut TetMesh| (input.prepare)(mesh).map_err(PartsError::other);
+        match parts::part_grid(&values, &prepare, config, count, metadata, &mut |part| {
+            self.keep_parted(&part)
+        }) {
+            Ok(plan) => self.keep_plan(&plan).map(|()| Ok(plan)),
+            Err(error @ PartsError::NeedsWhole { .. }) => Ok(Err(error)),
+            Err(error) => Err(said(error)),
+        }
     }
 
     /// The plan, as its first part has it, if this version has made it.

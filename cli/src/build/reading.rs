@@ -93,7 +93,9 @@ impl BuildOptions {
         let is_list = files::ending(path) == "pvtu";
         let is_known = || {
             let by_ranges = BY_RANGES.contains(&files::ending(path).as_str());
-            Ok::<_, anyhow::Error>(is_list || by_ranges || Pieces::are_beside(path)?)
+            // Folders are those of Zarr.
+            let is_zarr = path.is_dir() || files::is_zarr_address(path);
+            Ok::<_, anyhow::Error>(is_list || by_ranges || is_zarr || Pieces::are_beside(path)?)
         };
         if needs_whole || !is_known()? {
             return Ok(None);

@@ -90,6 +90,8 @@ mod write;
 mod write_layers;
 mod xml;
 mod xz;
+#[cfg(feature = "zarr")]
+mod zarr;
 
 #[doc(hidden)]
 pub use contents::{PieceCounts, Survey};
@@ -115,6 +117,9 @@ pub use write::{MeshArray, cell_arrays, point_arrays};
 pub use write::{write_vti, write_vtu};
 #[doc(hidden)]
 pub use write_layers::write_vti_layers;
+#[cfg(feature = "zarr")]
+#[doc(hidden)]
+pub use zarr::GridInParts;
 
 use std::path::Path;
 

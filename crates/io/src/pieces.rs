@@ -21,6 +21,8 @@ use crate::shared_points::{SharedPoints, hash};
 use crate::vtu::PieceReader;
 use crate::vtu_ranges::VtuFile;
 use crate::xml::Document;
+#[cfg(feature = "zarr")]
+use crate::zarr::{self, GridInParts};
 use crate::{CellData, PieceCounts, ReadOptions, packed};
 use tetralod::mesh::{MeshPiece, TetMesh};
 
@@ -39,6 +41,9 @@ enum Content {
     List(Vec<u8>),
     /// In this one.
     File(Box<dyn InPieces>),
+    /// In the chunks of arrays.
+    #[cfg(feature = "zarr")]
+    Grid(Box<GridInParts>),
 }
 
 impl Pieces {
@@ -93,6 +98,12 @@ impl Pieces {
         Ok(found)
     }
 
+    /// The regular grid that is read in boxes, of which no pieces come.
+    #[cfg(feature = "zarr")]
+    pub fn grid(&self) -> Option<&GridInParts> {
+        if let Content::Grid(grid) = &self.content { Some(grid) } else { None }
+    }
+
     /// The files with the pieces, which may not be there.
     ///
     /// # Errors
@@ -112,6 +123,11 @@ impl Pieces {
         let list = match &self.content {
             Content::List(list) => list,
             Content::File(file) => return Ok(file.counts()),
+            #[cfg(feature = "zarr")]
+            Content::Grid(grid) => {
+                let ([points, tetrahedra], fields) = (grid.mesh().counts(), grid.mesh().fields.len() as u64);
+                return Ok(PieceCounts { points, tetrahedra, pieces: 1, fields, ..PieceCounts::default() });
+            }
         };
         let document = Document::parse(without_mark(list)).map_err(|error| self.named(error))?;
         let mut counts = PieceCounts::default();
@@ -155,7 +171,8 @@ impl Pieces {
         }
     }
 
-    fn named(&self, error: ReadError) -> ReadError {
+    /// An error of reading, with the file.
+    pub fn named(&self, error: ReadError) -> ReadError {
         in_file(error, &self.path.display().to_string())
     }
 
@@ -169,6 +186,8 @@ impl Pieces {
         let read = match &self.content {
             Content::List(list) => return self.read_listed(&Document::parse(without_mark(list))?, each),
             Content::File(file) => file.for_each(&self.options, each),
+            #[cfg(feature = "zarr")]
+            Content::Grid(_) => Err(Stop::Whole("it is a grid")),
         };
         read.map_err(|stop| match stop {
             Stop::Read(error) => error,
@@ -226,6 +245,10 @@ impl Pieces {
 impl Content {
     /// A file that has several ranges; none if it is another one, or has not.
     fn of(path: &Path, options: &ReadOptions, most: Option<u64>) -> Result<Option<Self>, Stop> {
+        #[cfg(feature = "zarr")]
+        if let Some(grid) = zarr::open_in_parts(path, options)? {
+            return Ok(Some(Self::Grid(Box::new(grid))));
+        }
         #[cfg(feature = "hdf5")]
         if let Some(pieces) = ExodusPieces::open(path, options)? {
             return Ok(Some(Self::File(Box::new(pieces))));

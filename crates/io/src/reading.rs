@@ -35,6 +35,13 @@ pub(super) fn expanded(mut mesh: TetMesh, options: &ReadOptions) -> Result<TetMe
 }
 
 pub(super) fn read_unsettled(files: &FilesOf<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    #[cfg(feature = "zarr")]
+    if let Some(read) = crate::zarr::read_given(files, options) {
+        return read.map(|mut mesh| {
+            mesh.input.files.0 = files.all_read();
+            mesh
+        });
+    }
     if matches!(files.source, Source::Disk) && files.given.is_dir() {
         return Err(foreign::refused_folder(files.given)).in_file(&files.name());
     }

@@ -143,6 +143,14 @@ impl HttpSource {
         }
     }
 
+    /// Ranges of another file, asked for in the same way, by the same connections.
+    #[must_use]
+    pub fn of_another(&self, url: &str) -> Self {
+        let mut other = Self::new(url, self.options.clone());
+        other.client.agent = self.client.agent.clone();
+        other
+    }
+
     /// Whether the server gives ranges; where it does not, everything passes by from the start for whatever is wanted.
     pub fn serves_ranges(&self) -> Option<bool> {
         self.loader.serves_ranges()

@@ -1,11 +1,11 @@
-//! The parts of a regular grid, made one at a time: nothing but the values of the whole is in memory.
+//! The parts of a regular grid, made one at a time: nothing but the values of the whole is in memory, or of [`GridValues`] those of a part.
 //!
 //! The parts are those that [`part`](super::part) makes of the grid's points and tetrahedra, byte for byte.
 
 use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
 use super::piece::{Carried, Part, Piece};
-use super::plan::{MOST_TETS, Plan};
+use super::plan::{MOST_TETS, Plan, purpose};
 use crate::error::points::as_vec;
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
@@ -15,11 +15,118 @@ use crate::restrict::preserve::NEAR;
 use crate::restrict::restrictions::Restrictions;
 use crate::{BuildConfig, BuildError, Purpose};
 use glam::DVec3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use tetralod::geom::{Bounds, Lattice, ON_LATTICE};
-use tetralod::mesh::{Field, Grid, MAX_TETS, MeshError, TetMesh, kuhn_tets};
+use tetralod::geom::{Bounds, Lattice, ON_LATTICE, bits_of};
+use tetralod::mesh::{Extremes, Field, Grid, MAX_TETS, MOST_LABELS, MeshError, TetMesh, kuhn_tets};
 use tetralod::mt::{FieldInfo, MAX_UPDATES, MtInfo, MtKind};
+
+/// The points in a box of a grid.
+pub type PointBox = [Range<u32>; 3];
+
+/// A regular grid whose values are read in parts, never as a whole.
+pub struct GridValues<'a> {
+    /// The grid alone, with the fields without values.
+    pub mesh: TetMesh,
+    /// Layers of points across z that are best read together.
+    pub layers: u32,
+    /// Reads the values of a field, by its number, at the points in a box, x fastest: finite ones.
+    pub read: &'a dyn Fn(usize, PointBox) -> Result<Vec<f64>, PartsError>,
+}
+
+/// What is known of all values of a grid when each was read once.
+pub(super) struct Known<'a> {
+    of: &'a GridValues<'a>,
+    extremes: Vec<Option<Extremes>>,
+    hashers: Vec<crc32fast::Hasher>,
+}
+
+/// Parts a grid whose values are read in parts, as [`part`](super::part) would with all values: whether fields are labels, and what else
+/// depends on their values, `prepare` says of a mesh that has each value of few, and some of many.
+///
+/// # Errors
+/// As [`part`](super::part), and [`PartsError::NeedsWhole`] if `config` asks for what all values at once tell; those of reading.
+pub fn part_grid(
+    grid: &GridValues<'_>,
+    prepare: &dyn Fn(&mut TetMesh) -> Result<(), PartsError>,
+    config: &BuildConfig,
+    parts: u32,
+    metadata: BTreeMap<String, String>,
+    put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
+) -> Result<Plan, PartsError> {
+    let whole = |why| Err(PartsError::NeedsWhole { why });
+    let purpose = purpose(config, parts)?;
+    if !config.preserve.is_empty() {
+        return whole("regions are kept");
+    }
+    if config.position_tolerance.is_some() || field_lattice::has_tolerance(config) {
+        return whole("a tolerance is given");
+    }
+    let (mut mesh, known) = Known::of(grid)?;
+    prepare(&mut mesh)?;
+    match GridCut::new(&mesh, Some(&known), config, parts)? {
+        Some(cut) => cut.part(config, purpose, metadata, put),
+        None => whole("its points are not on a lattice of its own"),
+    }
+}
+
+impl<'a> Known<'a> {
+    /// Reads each value once; the mesh has some values of each field, the least and the largest among them.
+    fn of(of: &'a GridValues<'a>) -> Result<(TetMesh, Self), PartsError> {
+        let mut mesh = of.mesh.clone();
+        let Some(grid) = mesh.grid else { return Err(BuildError::Empty.into()) };
+        let (mut extremes, mut hashers) = (Vec::new(), Vec::new());
+        for (number, field) in mesh.fields.iter_mut().enumerate() {
+            let (mut ends, mut hasher, mut some) = (None, crc32fast::Hasher::new(), BTreeSet::new());
+            of.each_slab(number, grid.dims, &mut |points, values| {
+                let before: Option<Extremes> = ends.take();
+                let before = before.iter().flat_map(Extremes::both).map(|at| (at.value, at.place));
+                let here = values.iter().copied().zip(indices(points).map(|index| grid.point(index)));
+                ends = Extremes::of(before.chain(here));
+                values.iter().for_each(|x| hasher.update(&x.to_le_bytes()));
+                field.integer &= values.iter().all(field_lattice::is_exact_integer);
+                for &value in values {
+                    if some.len() > MOST_LABELS {
+                        break;
+                    }
+                    some.insert(bits_of(value));
+                }
+            })?;
+            let ends_of = ends.iter().flat_map(Extremes::both).map(|at| at.value);
+            field.values = some.into_iter().map(f64::from_bits).chain(ends_of).collect();
+            extremes.push(ends);
+            hashers.push(hasher);
+        }
+        Ok((mesh, Self { of, extremes, hashers }))
+    }
+}
+
+impl GridValues<'_> {
+    /// Reads a field in layers across z, with the points of each.
+    fn each_slab(
+        &self,
+        field: usize,
+        [nx, ny, nz]: [u32; 3],
+        each: &mut dyn FnMut(PointBox, &[f64]),
+    ) -> Result<(), PartsError> {
+        for start in (0..nz).step_by(self.layers.max(1) as usize) {
+            let points = [0..nx, 0..ny, start..nz.min(start + self.layers.max(1))];
+            let values = self.values(field, &points)?;
+            each(points, &values);
+        }
+        Ok(())
+    }
+
+    fn values(&self, field: usize, points: &PointBox) -> Result<Vec<f64>, PartsError> {
+        let values = (self.read)(field, points.clone())?;
+        let count: usize = points.iter().map(Range::len).product();
+        if values.len() == count {
+            return Ok(values);
+        }
+        let field = self.mesh.fields[field].name.clone();
+        Err(BuildError::from(MeshError::FieldLength { field, values: values.len(), points: count }).into())
+    }
+}
 
 /// A grid and its parts.
 pub(super) struct GridCut<'a> {
@@ -28,8 +135,9 @@ pub(super) struct GridCut<'a> {
     /// log2 of the lattice's steps in a cell.
     spare: u32,
     fields: Vec<&'a Field>,
-    /// All values, of these fields or not, for the checksum.
+    /// All values, of these fields or not, for the checksum; few of each field if they are read.
     mesh: &'a TetMesh,
+    read: Option<&'a Known<'a>>,
     /// Level by level and box by box the axis of a cut and the first cell behind it.
     cuts: Vec<Vec<(usize, u32)>>,
     /// Points that stay: their numbers, ascending.
@@ -40,7 +148,12 @@ pub(super) struct GridCut<'a> {
 
 impl<'a> GridCut<'a> {
     /// Cuts a grid alone; none if its points are not all on a lattice of its own, where the whole mesh decides on another one.
-    pub fn new(mesh: &'a TetMesh, config: &BuildConfig, parts: u32) -> Result<Option<Self>, PartsError> {
+    pub fn new(
+        mesh: &'a TetMesh,
+        read: Option<&'a Known<'a>>,
+        config: &BuildConfig,
+        parts: u32,
+    ) -> Result<Option<Self>, PartsError> {
         let Some(grid) = mesh.grid else { return Ok(None) };
         let [points, tetrahedra] = mesh.counts();
         if points > u64::from(MAX_UPDATES) || tetrahedra > MOST_TETS {
@@ -50,7 +163,8 @@ impl<'a> GridCut<'a> {
             return Err(BuildError::Empty.into());
         }
         let fields = field_selection::fields(mesh, config)?;
-        for field in &fields {
+        // What is read is checked then.
+        for field in fields.iter().filter(|_| read.is_none()) {
             if field.values.len() as u64 != points {
                 let error = MeshError::FieldLength {
                     field: field.name.clone(),
@@ -72,6 +186,7 @@ impl<'a> GridCut<'a> {
             spare,
             fields,
             mesh,
+            read,
             cuts: Vec::new(),
             kept: Vec::new(),
             boxes: Vec::new(),
@@ -194,16 +309,19 @@ impl<'a> GridCut<'a> {
         let alone = quantize::lattices_alone(info.lattice, info.fields.clone(), info.quantization);
         Restrictions::of_angles(config, &alone)?;
         for (index, cells) in (0..).zip(&self.boxes) {
-            put(Part::of(&plan, index, self.piece(index, cells)))?;
+            put(Part::of(&plan, index, self.piece(index, cells)?))?;
         }
         Ok(plan)
     }
 
     fn info(&self, config: &BuildConfig) -> Result<MtInfo, PartsError> {
         let mut fields: Vec<FieldInfo> = field_lattice::field_lattices(&self.fields, config)?;
-        field_lattice::set_extremes(&mut fields, &self.fields, || {
-            self.points().map(|at| self.grid.point(at))
-        });
+        match self.read {
+            Some(known) => self.measure(known, &mut fields)?,
+            None => field_lattice::set_extremes(&mut fields, &self.fields, || {
+                self.points().map(|at| self.grid.point(at))
+            }),
+        }
         let [vertices, tetrahedra] = self.mesh.counts().map(|count| count as u32);
         let ends = [[0; 3], self.grid.dims.map(|n| n - 1)].map(|index| self.grid.point(index));
         let moved = |index| {
@@ -220,6 +338,40 @@ impl<'a> GridCut<'a> {
             quantization: self.points().map(moved).fold(0.0, f64::max),
             bounds: None,
         })
+    }
+
+    /// The number of a chosen field among all.
+    fn number(&self, field: &Field) -> usize {
+        // It is one of them.
+        self.mesh.fields.iter().position(|known| std::ptr::eq(known, field)).unwrap_or_default()
+    }
+
+    /// What the lattices of fields lose, of values that are read again for it.
+    fn measure(&self, known: &Known<'_>, infos: &mut [FieldInfo]) -> Result<(), PartsError> {
+        for (info, &field) in infos.iter_mut().zip(&self.fields) {
+            let number = self.number(field);
+            info.extremes.clone_from(&known.extremes[number]);
+            info.quantization = 0.0;
+            // Integers are where such lattices have them.
+            if field.integer && info.step == 1.0 && info.origin.fract() == 0.0 {
+                continue;
+            }
+            let of = info.clone();
+            known.of.each_slab(number, self.grid.dims, &mut |_, values| {
+                let losses = values.iter().map(|&value| field_lattice::loss(&of, value));
+                info.quantization = losses.fold(info.quantization, f64::max);
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The values of a field at the points in a box.
+    fn values(&self, field: &Field, points: &PointBox) -> Result<Vec<f64>, PartsError> {
+        if let Some(known) = self.read {
+            return known.of.values(self.number(field), points);
+        }
+        let [nx, ny, _] = self.grid.dims;
+        Ok(indices(points.clone()).map(|[x, y, z]| field.values[(x + nx * (y + ny * z)) as usize]).collect())
     }
 
     /// As of the whole mesh.
@@ -242,6 +394,10 @@ impl<'a> GridCut<'a> {
             }
             hasher.update(&row);
         }
+        if let Some(known) = self.read {
+            known.hashers.iter().for_each(|of_field| hasher.combine(of_field));
+            return hasher.finalize();
+        }
         for values in self.mesh.fields.iter().flat_map(|field| field.values.chunks(4096)) {
             row.clear();
             row.extend(values.iter().flat_map(|x| x.to_le_bytes()));
@@ -250,7 +406,7 @@ impl<'a> GridCut<'a> {
         hasher.finalize()
     }
 
-    fn piece(&self, index: u32, cells: &[Range<u32>; 3]) -> Piece {
+    fn piece(&self, index: u32, cells: &[Range<u32>; 3]) -> Result<Piece, PartsError> {
         let [nx, ny, _] = self.grid.dims;
         let of_whole = |[x, y, z]: [u32; 3]| x + nx * (y + ny * z);
         // Points go one further than cells.
@@ -264,10 +420,9 @@ impl<'a> GridCut<'a> {
             let corner = |v: u32| local([x + (v & 1), y + (v >> 1 & 1), z + (v >> 2)]);
             tets.extend(cube.iter().map(|tet| tet.map(corner)));
         }
-        let values = |p: &[u32; 3]| {
-            let at = of_whole(*p) as usize;
-            self.fields.iter().map(move |field| field.values[at])
-        };
+        let points = [xs.clone(), ys.clone(), zs.clone()];
+        let values = self.fields.iter().map(|field| self.values(field, &points));
+        let values: Vec<Vec<f64>> = values.collect::<Result<_, _>>()?;
         let shared = (0..).zip(&here).filter_map(|(i, &p)| {
             let [first, last] = self.parts_at(p);
             (first != last).then_some((i, first, last))
@@ -280,14 +435,14 @@ impl<'a> GridCut<'a> {
             kept: kept.map(|(i, _)| i).collect(),
             ..Carried::default()
         };
-        Piece {
+        Ok(Piece {
             positions: here.iter().map(|&p| self.position(p)).collect(),
-            values: here.iter().flat_map(values).collect(),
+            values: (0..here.len()).flat_map(|i| values.iter().map(move |field| field[i])).collect(),
             points: here.iter().map(|&p| of_whole(p)).collect(),
             tets,
             carried,
             ..Piece::default()
-        }
+        })
     }
 
     /// The first and the last part that have a point.
@@ -375,11 +530,11 @@ mod tests {
         let spare = ((grid.spacing[0] / lattice.step[0]) as u32).ilog2();
         let cut = |parts: u32| {
             let (fields, cuts, kept, boxes) = Default::default();
-            let mut cut = GridCut { grid, lattice, spare, fields, mesh, cuts, kept, boxes };
+            let mut cut = GridCut { grid, lattice, spare, fields, mesh, cuts, kept, boxes, read: None };
             cut.cut(parts).map(|()| cut)
         };
-        // Four have too many each.
-        assert!(matches!(cut(4), Err(PartsError::Build(BuildError::TooLarge))));
+        // Two have too many each.
+        assert!(matches!(cut(2), Err(PartsError::Build(BuildError::TooLarge))));
         let cut = cut(64).expect("parts");
         let cells = |cells: &[Range<u32>; 3]| cells.iter().map(|range| range.len() as u64).product::<u64>();
         let [points, tetrahedra] = mesh.counts();
@@ -395,7 +550,7 @@ mod tests {
     fn more_is_refused_before_anything_else() {
         for dims in [[1024; 3], [896; 3], [1625; 3], [2, 1 << 15, 1 << 15]] {
             let (mesh, config) = (alone(dims), BuildConfig::default());
-            let refused = GridCut::new(&mesh, &config, 64);
+            let refused = GridCut::new(&mesh, None, &config, 64);
             assert!(matches!(refused.err(), Some(PartsError::Build(BuildError::TooLarge))), "{dims:?}");
         }
     }

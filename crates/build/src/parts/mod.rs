@@ -92,6 +92,7 @@ mod scratch;
 mod wire;
 
 pub use assemble::{Assembled, assemble, assemble_blocks};
+pub use grid::{GridValues, PointBox, part_grid};
 pub(super) use node::LEFT_AT_INTERFACE;
 pub use node::{build_part, join};
 pub use partition::part;

@@ -45,7 +45,7 @@ pub fn part(
     }
     if mesh.is_grid_alone() {
         // Regions need the labels of cells.
-        let alone = if config.preserve.is_empty() { GridCut::new(mesh, config, parts)? } else { None };
+        let alone = if config.preserve.is_empty() { GridCut::new(mesh, None, config, parts)? } else { None };
         if let Some(cut) = alone {
             return cut.part(config, purpose, metadata, put);
         }

@@ -118,6 +118,13 @@ pub(super) fn read(
 
 /// The times of the steps in the given file; fewer than two if it is of no format that is known to have some.
 pub(super) fn times(files: &FilesOf<'_>) -> Result<Vec<f64>, ReadError> {
+    #[cfg(feature = "zarr")]
+    {
+        let times = crate::zarr::times(files)?;
+        if !times.is_empty() {
+            return Ok(times);
+        }
+    }
     #[cfg(feature = "hdf5")]
     {
         let times = hdf5::times(files)?;
