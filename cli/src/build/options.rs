@@ -19,8 +19,8 @@ use tetralod_build::{
 #[derive(clap::Args)]
 pub struct BuildOptions {
     /// Mesh or grid: .vtu, .vti, .vts, .vtr, the lists .pvtu, .pvti, .pvts and .pvtr, .vtk, .vtkhdf, Exodus .exo, .ex2 or .e, Gmsh .msh,
-    /// Medit .mesh or .meshb, TetGen .node or .ele, Netgen .vol, .nrrd, .mha or .mhd, or .raw with a .json beside it; - is the
-    /// standard input. Points without cells go with --method insert. Several, a .pvd, and what a file has of them are time steps over
+    /// Medit .mesh or .meshb, TetGen .node or .ele, Netgen .vol, .nrrd, .mha or .mhd, .zarr (a folder, or an
+    /// http(s) or s3 address), or .raw with a .json beside it; - is the standard input. Points without cells go with --method insert. Several, a .pvd, and what a file has of them are time steps over
     /// one mesh.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,

@@ -25,3 +25,4 @@ mod support;
 mod surfaces;
 mod view;
 mod work;
+mod zarr;

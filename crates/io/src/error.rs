@@ -34,8 +34,9 @@ pub enum ReadReason {
     /// The content is of no known kind.
     #[error(
         "not a format that is known here; give VTK XML (.vtu, .vti, .vts, .vtr), legacy VTK (.vtk){}, Gmsh (.msh), Medit (.mesh), \
-         TetGen (.node, .ele), Netgen (.vol), NRRD or MetaImage, or raw samples with a .json sidecar",
-        if cfg!(feature = "hdf5") { ", VTKHDF, Exodus" } else { "" }
+         TetGen (.node, .ele), Netgen (.vol), NRRD or MetaImage{}, or raw samples with a .json sidecar",
+        if cfg!(feature = "hdf5") { ", VTKHDF, Exodus" } else { "" },
+        if cfg!(feature = "zarr") { ", a folder of Zarr (.zarr)" } else { "" }
     )]
     UnknownFormat,
     /// The text does not follow the rules of its format.

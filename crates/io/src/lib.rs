@@ -1,6 +1,6 @@
 //! Reads and writes exchange formats for [`tetralod`]: meshes and grids from files, and back to VTK; and makes volumes by formula.
 //!
-//! Formats with "`hdf5`" need that feature. All are read from files on a disk and [in memory](FilesInMemory) alike, also in WebAssembly.
+//! Formats with "`hdf5`" or "`zarr`" need that feature. All but Zarr are read from files on a disk and [in memory](FilesInMemory) alike, also in WebAssembly.
 //!
 //! | format | ending | read | written |
 //! |---|---|---|---|
@@ -18,6 +18,7 @@
 //! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text | |
 //! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; `hdf5` | |
 //! | Exodus II | `.exo`, `.ex2`, `.e` | in one file, or in pieces (`.e.4.0`); `hdf5` | |
+//! | Zarr, OME-Zarr | folder `.zarr` | versions 2 and 3; `zarr`, on servers `http` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |

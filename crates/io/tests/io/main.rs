@@ -29,3 +29,5 @@ mod ranges;
 mod real;
 mod surfaces;
 mod survey;
+#[cfg(feature = "zarr")]
+mod zarr;
