@@ -249,6 +249,10 @@ impl Content {
         if let Some(grid) = zarr::open_in_parts(path, options)? {
             return Ok(Some(Self::Grid(Box::new(grid))));
         }
+        // What is wrong with it is for its reader to say.
+        if path.is_dir() {
+            return Ok(None);
+        }
         #[cfg(feature = "hdf5")]
         if let Some(pieces) = ExodusPieces::open(path, options)? {
             return Ok(Some(Self::File(Box::new(pieces))));

@@ -10,7 +10,7 @@ use zarrs::array::{
 use zarrs::plugin::{ExtensionName, PluginCreateError, ZarrVersion};
 use zarrs::storage::StorageError;
 
-use crate::error::{At, ReadError, ReadReason};
+use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::memory::MemoryLimit;
 use crate::number::NumberType;
 use crate::zarr::axes::Axes;
@@ -18,6 +18,9 @@ use crate::zarr::store::Store;
 
 /// Most bytes of a chunk.
 const MOST_CHUNK: u64 = 1 << 31;
+/// So many times the bytes of a box are read to have whole chunks, and so many bytes in any case.
+const MUCH_MORE: u64 = 4;
+const FEW_BYTES: u64 = 1 << 26;
 
 /// An array of numbers in a store.
 #[derive(Debug)]
@@ -105,7 +108,7 @@ impl Samples {
 
     /// All values of an array of one axis.
     pub fn list(&self) -> Result<Vec<f64>, ReadError> {
-        self.floats(&[0..self.shape()[0]])
+        self.ordered(&[0..self.shape()[0]], &[0])
     }
 
     /// The values in a box, x fastest, of one time and channel.
@@ -124,62 +127,83 @@ impl Samples {
         for (axis, range) in axes.space.into_iter().zip(range) {
             ranges[axis] = range;
         }
-        let values = self.floats(&ranges)?;
-        let [x, y, z] = axes.space;
-        if z < y && y < x {
-            return Ok(values);
-        }
-        // The last axis of the array is the fastest.
-        let count = |axis: usize| (ranges[axis].end - ranges[axis].start) as usize;
-        let stride = |axis: usize| (axis + 1..ranges.len()).map(count).product::<usize>();
-        let [by_x, by_y, by_z] = [x, y, z].map(stride);
-        let mut ordered = Vec::with_capacity(values.len());
-        for k in 0..count(z) {
-            for j in 0..count(y) {
-                let row = k * by_z + j * by_y;
-                ordered.extend((0..count(x)).map(|i| values[row + i * by_x]));
-            }
-        }
-        Ok(ordered)
+        self.ordered(&ranges, &axes.space)
     }
 
-    /// The values in a box of the array, in its order.
-    fn floats(&self, ranges: &[Range<u64>]) -> Result<Vec<f64>, ReadError> {
-        let read = |ranges: &[Range<u64>]| {
-            let bytes: ArrayBytes<'static> =
-                self.array.retrieve_array_subset(&ArraySubset::new_with_ranges(ranges)).map_err(not_read)?;
-            let bytes = bytes.into_fixed().map_err(|error| damaged(&error))?;
-            Ok(self.number.floats(&bytes))
+    /// The values in a box of the array, along these axes, the first one fastest; along others there is one.
+    fn ordered(&self, ranges: &[Range<u64>], order: &[usize]) -> Result<Vec<f64>, ReadError> {
+        let place = || shown(&self.path);
+        // Of whole chunks, length and checksum are looked at.
+        let read = self.in_whole_chunks(ranges).at(place)?;
+        let bytes = self
+            .bytes(&read)
+            .map_err(|reason| self.in_chunk(&read).unwrap_or_else(|| at_place(place(), reason)))?;
+        let count = |range: &Range<u64>| (range.end - range.start) as usize;
+        let size = self.number.size() as usize;
+        expect_count("bytes of samples", size * read.iter().map(count).product::<usize>(), bytes.len())
+            .at(place)?;
+        // The last axis of the array is the fastest.
+        let stride = |axis: usize| read[axis + 1..].iter().map(count).product::<usize>();
+        let first: usize = (0..ranges.len())
+            .map(|axis| (ranges[axis].start - read[axis].start) as usize * stride(axis))
+            .sum();
+        let along: Vec<[usize; 2]> = order.iter().map(|&axis| [count(&ranges[axis]), stride(axis)]).collect();
+        let [[nx, by_x], [ny, by_y], [nz, by_z]] = [0, 1, 2].map(|k| along.get(k).copied().unwrap_or([1, 0]));
+        let is_as_read = along.iter().rev().map(|[_, by]| by).is_sorted_by(|a, b| a >= b);
+        if is_as_read && read == ranges {
+            return Ok(self.number.floats(&bytes));
+        }
+        let mut found = Vec::with_capacity(size * nx * ny * nz);
+        for k in 0..nz {
+            for j in 0..ny {
+                let row = first + k * by_z + j * by_y;
+                for i in 0..nx {
+                    found.extend_from_slice(&bytes[(row + i * by_x) * size..][..size]);
+                }
+            }
+        }
+        Ok(self.number.floats(&found))
+    }
+
+    /// The chunks that a box is in, or the box itself where these have much more.
+    fn in_whole_chunks(&self, ranges: &[Range<u64>]) -> Result<Vec<Range<u64>>, ReadReason> {
+        let chunk = self.chunk()?;
+        let whole = |(range, chunk): (&Range<u64>, &u64)| {
+            range.start / chunk * chunk..range.end.div_ceil(*chunk).saturating_mul(*chunk)
         };
-        let values = read(ranges).map_err(|reason| {
-            self.in_chunk(ranges, &read).unwrap_or_else(|| ReadError {
-                file: String::new(),
-                place: shown(&self.path),
-                reason,
-            })
-        })?;
-        let expected: u64 = ranges.iter().map(|range| range.end - range.start).product();
-        crate::error::expect_count("samples", expected, values.len()).at(|| shown(&self.path))?;
-        Ok(values)
+        let whole: Vec<Range<u64>> = ranges.iter().zip(&chunk).map(whole).collect();
+        let bytes = |ranges: &[Range<u64>]| {
+            let counts = ranges.iter().map(|range| range.end - range.start);
+            counts.fold(self.number.size(), u64::saturating_mul)
+        };
+        let most = bytes(ranges).saturating_mul(MUCH_MORE).max(FEW_BYTES);
+        Ok(if bytes(&whole) <= most { whole } else { ranges.to_vec() })
+    }
+
+    /// The samples in a box of the array, in its order.
+    fn bytes(&self, ranges: &[Range<u64>]) -> Result<Vec<u8>, ReadReason> {
+        let bytes: ArrayBytes<'static> =
+            self.array.retrieve_array_subset(&ArraySubset::new_with_ranges(ranges)).map_err(not_read)?;
+        Ok(bytes.into_fixed().map_err(|error| damaged(&error))?.into_owned())
     }
 
     /// The first chunk in a box that cannot be read, and why.
-    fn in_chunk(
-        &self,
-        ranges: &[Range<u64>],
-        read: &dyn Fn(&[Range<u64>]) -> Result<Vec<f64>, ReadReason>,
-    ) -> Option<ReadError> {
+    fn in_chunk(&self, ranges: &[Range<u64>]) -> Option<ReadError> {
         let chunks = self.array.chunks_in_array_subset(&ArraySubset::new_with_ranges(ranges)).ok()??;
         for chunk in &chunks.indices() {
-            let of_chunk = self.array.chunk_subset_bounded(&chunk).ok()?.to_ranges();
+            let of_chunk = self.array.chunk_subset(&chunk).ok()?.to_ranges();
             let both = of_chunk.iter().zip(ranges).map(|(a, b)| a.start.max(b.start)..a.end.min(b.end));
-            if let Err(reason) = read(&both.collect::<Vec<_>>()) {
+            if let Err(reason) = self.bytes(&both.collect::<Vec<_>>()) {
                 let place = format!("chunk \"{}\"", self.array.chunk_key(&chunk).as_str());
-                return Some(ReadError { file: String::new(), place, reason });
+                return Some(at_place(place, reason));
             }
         }
         None
     }
+}
+
+fn at_place(place: String, reason: ReadReason) -> ReadError {
+    ReadError { file: String::new(), place, reason }
 }
 
 /// An array in messages.

@@ -17,7 +17,7 @@ use crate::zarr::array::{Samples, shown};
 use crate::zarr::axes::{Axes, Axis, listed, to_one_unit};
 use crate::zarr::lz4;
 use crate::zarr::node::{Kind, Node};
-use crate::zarr::ome::Image;
+use crate::zarr::ome::{Image, Level};
 use crate::zarr::store::{Store, is_address, is_root};
 use tetralod::mesh::{MeshInput, TetMesh};
 
@@ -297,8 +297,8 @@ impl Opening<'_> {
                 Kind::Group { .. } => groups.push(name.as_str()),
             }
         }
-        let named: Vec<String> =
-            arrays.iter().flat_map(|found| &found.all).map(|axis| axis.name.clone()).collect();
+        let several = arrays.iter().filter(|found| found.shape.len() > 1);
+        let named: Vec<String> = several.flat_map(|found| &found.all).map(|axis| axis.name.clone()).collect();
         let is_coordinate = |found: &Found| found.shape.len() == 1 && named.contains(&found.path);
         let (along, mut arrays): (Vec<Found>, Vec<Found>) = arrays.into_iter().partition(is_coordinate);
         let mut notes = Vec::new();
@@ -333,21 +333,26 @@ impl Opening<'_> {
 
     /// The finest level of an image, or another one.
     fn image(&self, image: &Image, level: Option<&str>) -> Result<Volume, ReadError> {
+        let given = level;
         let level = image.levels.iter().find(|known| level.is_none_or(|path| known.path == path));
-        let missing = |what: String| ReadReason::Missing(what);
-        let level = level.ok_or_else(|| missing("a level of \"multiscales\"".into())).at(String::new)?;
+        let missing = || ReadReason::Missing("a level of \"multiscales\"".into());
+        let level = level.ok_or_else(missing).at(String::new)?;
         let place = || shown(&level.path);
-        let node = Node::of(&self.store, &level.path)?;
-        let node = node.ok_or_else(|| missing("the array that \"multiscales\" names".into())).at(place)?;
-        let mut found = Found::of(&level.path, &node).at(place)?;
-        match &image.axes {
-            Some(axes) => found.all.clone_from(axes),
-            // Five, in this order, before version 0.3.
-            None if found.shape.len() == 5 => found.all = ["t", "c", "z", "y", "x"].map(Axis::named).to_vec(),
-            None => {}
+        let (found, axes) = self.level(image, level)?;
+        let is_large = |found: &Found, axes: &Axes| {
+            let points = axes.dims(&found.shape).into_iter().fold(1, u64::saturating_mul);
+            points > grid::MAX_GRID_POINTS
+        };
+        if given.is_none() && is_large(&found, &axes) {
+            for coarser in &image.levels {
+                let (of_coarser, axes) = self.level(image, coarser)?;
+                if !is_large(&of_coarser, &axes) {
+                    let what = format!("an image with the axes {}", listed(&found.all, &found.shape));
+                    let remedy = format!("give a coarser level: {}", self.below(&coarser.path));
+                    return Err(ReadReason::unsupported(what, remedy)).at(place);
+                }
+            }
         }
-        expect_count("axes of \"multiscales\"", found.shape.len(), found.all.len()).at(place)?;
-        let axes = Axes::of(&found.all, &found.shape).at(place)?;
         let steps = level.steps(found.all.len()).at(place)?;
         let units = axes.space.map(|axis| found.all[axis].unit.as_str());
         let factors = to_one_unit(units).at(place)?;
@@ -367,15 +372,31 @@ impl Opening<'_> {
         let places = Places::Even(Placement { dims: volume.dims, origin: [x, y, z], steps });
         let times = times.map(|(count, [step, start])| (0..count).map(|i| i as f64 * step + start).collect());
         let mut volume = Volume { places, times: times.unwrap_or_default(), notes, ..volume };
-        for (own, label) in
-            volume.arrays.iter_mut().flat_map(|array| array.names.iter_mut()).zip(&image.channels)
-        {
+        let several = volume.arrays.iter_mut().filter(|array| array.names.len() > 1);
+        for (own, label) in several.flat_map(|array| &mut array.names).zip(&image.channels) {
             if !label.is_empty() {
                 *own = format!("{name}_{label}");
             }
         }
         check_times(&volume.times).at(place)?;
         Ok(volume)
+    }
+
+    /// The array of a level, and its axes.
+    fn level(&self, image: &Image, level: &Level) -> Result<(Found, Axes), ReadError> {
+        let place = || shown(&level.path);
+        let missing = || ReadReason::Missing("the array that \"multiscales\" names".into());
+        let node = Node::of(&self.store, &level.path)?.ok_or_else(missing).at(place)?;
+        let mut found = Found::of(&level.path, &node).at(place)?;
+        match &image.axes {
+            Some(axes) => found.all.clone_from(axes),
+            // Five, in this order, before version 0.3.
+            None if found.shape.len() == 5 => found.all = ["t", "c", "z", "y", "x"].map(Axis::named).to_vec(),
+            None => {}
+        }
+        expect_count("axes of \"multiscales\"", found.shape.len(), found.all.len()).at(place)?;
+        let axes = Axes::of(&found.all, &found.shape).at(place)?;
+        Ok((found, axes))
     }
 
     /// Arrays, with the names of their fields, as one volume.

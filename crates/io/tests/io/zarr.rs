@@ -9,6 +9,8 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use tetralod::mesh::TetMesh;
+use tetralod_build::parts::{self, GridValues, Part, PartsError, Plan, PointBox};
+use tetralod_build::{BuildConfig, FieldPrecision, mark_labels};
 use tetralod_io::{self as io, Pieces, ReadOptions, ReadReason};
 use zarrs::array::{Array, ArrayBytes, ArrayMetadata};
 use zarrs::storage::store::MemoryStore;
@@ -310,6 +312,19 @@ fn images_lie_where_they_say() {
 }
 
 #[test]
+fn an_image_that_is_too_large_names_a_level_that_is_not() {
+    let folder = Folder::new();
+    image(&folder, "large.zarr", &SPACE, &[2, 3, 4], 5);
+    folder.write_json(
+        "large.zarr/0/zarr.json",
+        &changed(plain(), &[("shape", json!([1 << 10, 1 << 10, 1 << 10]))]),
+    );
+    let said = folder.refused("large.zarr");
+    assert!(said.contains("z (1024), y (1024), x (1024)") && said.ends_with("large.zarr/1"), "{said}");
+    assert_eq!(folder.read("large.zarr/1").grid.expect("a grid").dims, [4, 3, 2]);
+}
+
+#[test]
 fn times_are_steps_and_channels_are_fields() {
     let folder = Folder::new();
     let axes = [&[("t", "time", "second"), ("c", "channel", "")], &SPACE[..]].concat();
@@ -459,6 +474,7 @@ fn chunks_that_are_damaged_are_named() {
     let crc32c = json!([bytes_codec("little"), { "name": "crc32c" }]);
     for (name, metadata) in [("plain.zarr", plain()), ("crc.zarr", version_3(&crc32c))] {
         folder.array(name, &metadata, bytes_of(&values()));
+        // Also where the chunk reaches beyond the array.
         let chunk = format!("{name}/c/1/0/1");
         let mut bytes = fs::read(folder.path(&chunk)).expect("a chunk");
         if name == "plain.zarr" {
@@ -539,6 +555,60 @@ fn boxes_are_read_without_the_chunks_beside_them() {
     assert_eq!(grid.values(0, [0..2, 0..3, 0..2]).expect("a box").len(), 12);
     let said = pieces.named(grid.values(0, [0..3, 0..4, 0..5]).unwrap_err()).to_string();
     assert!(said.contains("3-plain.zarr") && said.contains("c/2/1/1"), "{said}");
+}
+
+/// The parts of a volume, as bytes: of all values, and of values that are read for each part.
+fn parts_of(path: &Path, config: &BuildConfig, count: u32) -> [Result<Vec<Vec<u8>>, String>; 2] {
+    let collect =
+        |part: &dyn Fn(&mut dyn FnMut(Part) -> Result<(), PartsError>) -> Result<Plan, PartsError>| {
+            let mut all = Vec::new();
+            let plan = part(&mut |part| {
+                let mut bytes = Vec::new();
+                part.write(&mut bytes)?;
+                all.push(bytes);
+                Ok(())
+            });
+            plan.map(|_| all).map_err(|error| error.to_string())
+        };
+    let mut mesh = io::read_unexpanded(path, &ReadOptions::default()).expect("a mesh");
+    mark_labels(&mut mesh, &[], config).expect("labels");
+    let pieces =
+        Pieces::open_ranges(path, &ReadOptions::default(), None).expect("no error").expect("in parts");
+    let grid = pieces.grid().expect("a grid");
+    let read = |field: usize, points: PointBox| grid.values(field, points).map_err(PartsError::other);
+    let values = GridValues { mesh: grid.mesh().clone(), layers: grid.layers(), read: &read };
+    let prepare = |mesh: &mut TetMesh| Ok(mark_labels(mesh, &[], config)?);
+    [
+        collect(&|put| parts::part(&mesh, config, count, BTreeMap::new(), put)),
+        collect(&|put| parts::part_grid(&values, &prepare, config, count, BTreeMap::new(), put)),
+    ]
+}
+
+#[test]
+fn parts_of_values_that_are_read_for_each_are_those_of_the_whole() {
+    let folder = Folder::new();
+    for (name, metadata) in all_ways() {
+        folder.array(&name, &metadata, bytes_of(&values()));
+        let [whole, read] = parts_of(&folder.path(&name), &BuildConfig::default(), 4);
+        assert_eq!(whole.as_ref().map(Vec::len), Ok(4), "{name}");
+        assert!(whole == read, "{name}");
+    }
+    // Floating-point numbers, some fields, and one that is a label by its name.
+    folder.write_json("g.zarr/zarr.json", &json!({ "zarr_format": 3, "node_type": "group" }));
+    let floats = changed(plain(), &[("data_type", json!("float64"))]);
+    let bytes = values().into_iter().flat_map(|v| f64::from(v).sin().to_ne_bytes()).collect();
+    folder.array("g.zarr/density", &floats, bytes);
+    let labels: Vec<u16> = values().into_iter().map(|v| v % 3).collect();
+    folder.array("g.zarr/material", &plain(), bytes_of(&labels));
+    for all_lossless in [false, true] {
+        let config = BuildConfig { all_fields: true, all_lossless, ..BuildConfig::default() };
+        let [whole, read] = parts_of(&folder.path("g.zarr"), &config, 8);
+        assert_eq!(whole.as_ref().map(Vec::len), Ok(8));
+        assert!(whole == read);
+    }
+    let config = BuildConfig { field_precision: FieldPrecision::Units(0.1), ..BuildConfig::default() };
+    let [whole, read] = parts_of(&folder.path("g.zarr"), &config, 2);
+    assert!(whole.is_ok() && read.expect_err("it needs all values").contains("a tolerance is given"));
 }
 
 #[cfg(feature = "http")]
@@ -661,6 +731,8 @@ mod on_servers {
         let said = read("group.zarr").unwrap_err().to_string();
         assert!(said.contains("does not say what is in it") && said.contains("consolidate"), "{said}");
         // Consolidated metadata say what is in a group.
+        let server = Server::start(folder.0.path(), None);
+        let read = |name: &str| io::read(&PathBuf::from(format!("{}/{name}", server.address)));
         folder.array("group.zarr/one", &plain(), bytes_of(&values()));
         let all = json!({ "kind": "inline", "must_understand": false, "metadata": { "one": plain() } });
         folder.write_json("group.zarr/zarr.json", &changed(group, &[("consolidated_metadata", all)]));
