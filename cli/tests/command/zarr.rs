@@ -70,7 +70,7 @@ fn the_whole_and_its_parts_are_those_of_other_formats() {
         for options in [
             &[][..],
             &["--parts", "4"],
-            &["--parts", "16", "--lossless", "value"],
+            &["--parts", "16", "--lossless"],
             &["--parts", "2", "--label", "value"],
             &["--parts", "2", "--field-tolerance", "0.1"],
         ] {

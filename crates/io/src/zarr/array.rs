@@ -241,9 +241,10 @@ fn not_opened(error: ArrayCreateError) -> ReadReason {
         ArrayCreateError::ChunkKeyEncodingCreateError(error) => {
             unsupported("names of chunks that are not known here", &error)
         }
-        ArrayCreateError::UnsupportedZarrV2Array(what) => {
-            ReadReason::unsupported(format!("an array of version 2 ({what})"), "write it again as version 3")
-        }
+        ArrayCreateError::UnsupportedZarrV2Array(what) => ReadReason::unsupported(
+            format!("an array of version 2 ({what})"),
+            "write it again with a common codec, such as zstd or blosc",
+        ),
         ArrayCreateError::StorageError(StorageError::Other(what)) => ReadReason::Io(what),
         other => ReadReason::Syntax(other.to_string()),
     }
