@@ -32,7 +32,8 @@ pub(super) trait Page {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Pages<P> {
     /// The last one is present.
-    pages: Vec<Option<P>>,
+    /// Their places are there for all up to the last one: they are small.
+    pages: Vec<Option<Box<P>>>,
     /// log2 of the updates of a page.
     bits: u32,
     /// Updates of the complete MT.
@@ -89,13 +90,13 @@ impl<P: Page> Pages<P> {
     }
 
     pub fn get(&self, page: u32) -> Option<&P> {
-        self.pages.get(page as usize)?.as_ref()
+        self.pages.get(page as usize)?.as_deref()
     }
 
     /// The page of an update, and the update's place in it.
     #[inline]
     pub fn find(&self, u: u32) -> Option<(&P, usize)> {
-        Some((self.pages.get((u >> self.bits) as usize)?.as_ref()?, self.place(u)))
+        Some((self.pages.get((u >> self.bits) as usize)?.as_deref()?, self.place(u)))
     }
 
     #[inline]
@@ -145,7 +146,7 @@ impl<P: Page> Pages<P> {
         if page as usize == self.pages.len() {
             let empty = new(self.updates_of(page));
             self.bytes += empty.bytes() as u64;
-            self.pages.push(Some(empty));
+            self.pages.push(Some(Box::new(empty)));
         }
         self.change_last(push);
         self.updates += 1;
@@ -182,19 +183,19 @@ impl<P: Page> Pages<P> {
         }
         self.bytes += new.bytes() as u64;
         self.present += new.updates();
-        self.pages[page as usize] = Some(new);
+        self.pages[page as usize] = Some(Box::new(new));
         self.updates = self.updates.max(self.updates_of(page).end);
     }
 
     /// Takes a page away; none if it is not present.
-    pub fn remove(&mut self, page: u32) -> Option<P> {
+    pub fn remove(&mut self, page: u32) -> Option<Box<P>> {
         let gone = self.pages.get_mut(page as usize)?.take()?;
         self.bytes -= gone.bytes() as u64;
         self.present -= gone.updates();
         while self.pages.last().is_some_and(Option::is_none) {
             self.pages.pop();
         }
-        let last = self.pages.last().and_then(Option::as_ref);
+        let last = self.pages.last().and_then(Option::as_deref);
         let before = self.pages.len().saturating_sub(1) << self.bits;
         self.updates = last.map_or(0, |last| before as u32 + last.updates());
         Some(gone)
