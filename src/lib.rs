@@ -133,7 +133,7 @@
 //! | *forced* update | applied only because an update that a request needs depends on it |
 //! | *satisfied*, *missing* | the mesh meets its request; it does not because data has not arrived |
 //! | *section*, *head* | a part of a file with a kind, a length and a checksum, which are its head |
-//! | *block*, *index* | consecutive updates in a file, the smallest part that is fetched; the section that says where each block is and what it contains |
+//! | *block*, *index* | consecutive updates in a file, the smallest part that is fetched; the section that says where each block is and what it contains, or of a long file its pages, each a section for some blocks |
 //! | *page* | the updates of a block in memory: they are inserted and evicted together |
 //! | *prefix* | the first bytes of a file; with the base mesh in it, it is an MT by itself |
 //! | *residual* | a number in a file minus its prediction, which the reader makes, too |

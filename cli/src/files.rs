@@ -174,7 +174,7 @@ pub fn write_mt(path: &Path, mt: &Mt, exact: Vec<Exact>, metadata: BTreeMap<Stri
 
 /// How MT files are written.
 pub fn options(exact: Vec<Exact>, metadata: BTreeMap<String, String>) -> EncodeOptions {
-    EncodeOptions { check_margins: true, exact, histograms: true, metadata }
+    EncodeOptions { check_margins: true, exact, histograms: true, index_page_bits: None, metadata }
 }
 
 /// Works in a folder beside the place of an output; it is gone afterwards, also if the work fails.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tetralod::format;
-use tetralod::format::{BlockInfo, ErrorBytes, ExactStatus};
+use tetralod::format::{ErrorBytes, ExactStatus};
 use tetralod::mesh::{Averaged, Extreme, Extremes, VectorPart};
 use tetralod::mt::{self, FieldInfo, MtInfo, MtKind, MultiTessellation, RegionInfo, stats};
 use tetralod::refine::Request;
@@ -151,8 +151,14 @@ struct Blocks {
     updates_per_block: u32,
     /// From the start of the file to the end of the index.
     index_bytes: u64,
-    /// From the start of the file to its first block.
+    /// From the start of the file to its first block, or the first page of the index.
     head_bytes: u64,
+    /// Pages of the index, which stand in front of the first block.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    index_pages: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    index_page_bytes: Option<u64>,
+    /// Of those that are known.
     largest_bytes: u64,
 }
 
@@ -318,18 +324,21 @@ fn blocks(opened: &Opened) -> Option<Blocks> {
     let index = decoder.index()?;
     let head_bytes = decoder.head_end().unwrap_or(0);
     Some(Blocks {
-        count: index.blocks.len(),
+        count: index.count() as usize,
         updates_per_block: 1 << index.block_bits,
         index_bytes: head_bytes.saturating_sub(index.shared),
         head_bytes,
-        largest_bytes: index.blocks.iter().map(BlockInfo::len).max().unwrap_or(0),
+        index_pages: index.is_paged().then_some(index.pages().len()),
+        index_page_bytes: index.is_paged().then_some(index.first_block()),
+        largest_bytes: index.known().map(|(_, block)| block.len()).max().unwrap_or(0),
     })
 }
 
 fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     let mut parts = format::breakdown(opened.mt()?)?;
     let blocks = blocks(opened);
-    parts.extend(blocks.as_ref().map(|blocks| ("header, description and index", blocks.index_bytes as f64)));
+    let of_index = |blocks: &Blocks| blocks.index_bytes + blocks.index_page_bytes.unwrap_or(0);
+    parts.extend(blocks.as_ref().map(|blocks| ("header, description and index", of_index(blocks) as f64)));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
     let rest = match blocks {
         Some(_) if opened.mt()?.regions().is_some() => {
@@ -477,8 +486,11 @@ fn part_row(part: &FilePart, file_bytes: u64) -> String {
     format!("{}: {:.2} per vertex ({share})", part.name, part.bytes_per_vertex)
 }
 
-fn block_rows(blocks: &Blocks, file_bytes: u64) -> [(&'static str, String); 2] {
-    [
+fn block_rows(blocks: &Blocks, file_bytes: u64) -> Vec<(&'static str, String)> {
+    let pages = blocks.index_pages.zip(blocks.index_page_bytes);
+    let pages = pages
+        .map(|(count, bytes)| ("pages of the index", format!("{count}, in all {}", output::bytes(bytes))));
+    let rows = [
         (
             "blocks",
             format!(
@@ -497,7 +509,8 @@ fn block_rows(blocks: &Blocks, file_bytes: u64) -> [(&'static str, String); 2] {
                 output::percent(blocks.index_bytes as f64 / file_bytes.max(1) as f64)
             ),
         ),
-    ]
+    ];
+    rows.into_iter().chain(pages).collect()
 }
 
 fn rows(report: &Report) -> Vec<(&str, String)> {

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
-use tetralod::format::{DecodeOptions, Decoder, Limits};
+use tetralod::format::{DecodeOptions, Decoder, Index, Limits};
 use tetralod::geom::Bounds;
 use tetralod::mt::{MtInfo, MultiTessellation, UpdatePages};
 use tetralod::refine::{Front, LodCriterion, Need, Request};
@@ -109,7 +109,7 @@ fn come_and_go(script: &[u8; SCRIPT], file: &[u8]) {
         }
     }
     let Some(mut front) = decoder.mt().and_then(|mt| Front::new(mt).ok()) else { return };
-    let blocks = decoder.index().map_or(0, |index| index.blocks.len() as u32);
+    let blocks = decoder.index().map_or(0, Index::count);
     for (step, &byte) in script.iter().cycle().take(4 * SCRIPT).enumerate() {
         let block = (u32::from(byte) + step as u32 / SCRIPT as u32 * 5) % (blocks + 1);
         if byte & 0xC0 == 0xC0 {
@@ -156,6 +156,11 @@ fn part<'a>(file: &'a [u8], range: &std::ops::Range<u64>) -> &'a [u8] {
 }
 
 fn arrive(decoder: &mut Decoder, front: &mut Front, block: u32, file: &[u8]) {
+    let page = decoder.index().map_or(0, |index| index.page_of(block));
+    if let Some(range) = decoder.index_page_range(page) {
+        // It may be here, or damaged.
+        let _ = decoder.take_index_page(page, part(file, &range));
+    }
     let ranges = decoder.block_ranges(block);
     let bytes: Vec<u8> = ranges.iter().flat_map(|range| part(file, range)).copied().collect();
     let before = decoder.mt().map(|mt| mt.present());
@@ -173,6 +178,9 @@ fn leave(decoder: &mut Decoder, front: &mut Front, block: u32) {
     let Some(mt) = decoder.mt() else { return };
     if mt.has_page(block) && front.prepare_eviction(mt, block) {
         assert_eq!(decoder.drop_block(block), Ok(()), "it is here, and nothing needs it");
+        if let Some(page) = decoder.index().map(|index| index.page_of(block)) {
+            decoder.drop_index_page(page);
+        }
     }
 }
 

@@ -15,7 +15,6 @@ use super::payload::index::{BlockInfo, Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::section::{PutBytes, Section};
 use super::{EncodeError, EncodeOptions, checksum, payload};
 use crate::mt::{Exact, Mt, Regions, VertexId};
-use std::collections::BTreeMap;
 use std::io;
 
 /// The bytes of an MT file, in blocks as large as [`Mt::in_pages`] has made them: those of a half-edge MT are its pages, and what a client
@@ -60,7 +59,7 @@ fn encode_kind<C: Codec>(
     let lengths = |sections: &Vec<Section>| sections.iter().map(|section| section.len() as u32).collect();
     let mut blocks = scan.blocks;
     blocks.iter_mut().zip(&of_blocks).for_each(|(block, sections)| block.lengths = lengths(sections));
-    let mut file = File::begin(mt, &models, (&options.metadata, scan.histograms.as_ref()), blocks)?;
+    let mut file = File::begin(mt, &models, (options, scan.histograms.as_ref()), blocks)?;
     file.has_exact = !mt.info().kind.is_paged() && !exact.is_empty();
     file.of_blocks = of_blocks.iter().flatten().map(|section| (section.len(), section.head.crc)).collect();
     for (field, corrections) in &exact {
@@ -76,6 +75,7 @@ pub struct File {
     /// The bytes and the checksum of each section of the blocks.
     pub of_blocks: Vec<(u64, u32)>,
     behind: Vec<Section>,
+    index_pages: bool,
     has_exact: bool,
 }
 
@@ -84,21 +84,36 @@ impl File {
     pub fn begin<C: Codec>(
         mt: &C,
         models: &Models,
-        (metadata, histograms): (&BTreeMap<String, String>, Option<&Histograms>),
-        blocks: Vec<BlockInfo>,
+        (options, histograms): (&EncodeOptions, Option<&Histograms>),
+        mut blocks: Vec<BlockInfo>,
     ) -> Result<Self, EncodeError> {
-        let mut index = Index { block_bits: mt.page_bits(), shared: 0, blocks };
+        let has_index = mt.info().kind.is_paged();
+        blocks.iter_mut().filter(|_| has_index).for_each(|block| block.round());
+        let mut index = Index::new(mt.page_bits(), blocks);
+        if has_index {
+            index = index.as_written(mt.info(), options.index_page_bits);
+        }
         let shared = shared_sections(mt, models, histograms, &index)?;
         let mut payload = Vec::new();
-        payload::write_info(&mut payload, mt.info(), metadata)?;
+        payload::write_info(&mut payload, mt.info(), &options.metadata)?;
         let mut front = vec![Section::new(Kind::INFO, payload)?];
-        if mt.info().kind.is_paged() {
-            index.round(mt.info());
+        let mut pages = Vec::new();
+        if index.is_paged() {
+            let has_regions = mt.regions().is_some();
+            for page in 0..index.pages().len() as u32 {
+                let write = |out: &mut Vec<u8>| index.write_page(out, page, mt.info(), has_regions);
+                pages.push(Section::written(Kind::IPAG, write)?);
+            }
+            index.set_sections(pages.iter().map(|page| page.len() as u32));
+        }
+        if has_index {
             index.shared = shared.iter().map(Section::len).sum();
             front.push(Section::written(Kind::INDX, |out| index.write(out, mt.info()))?);
         }
         front.extend(shared);
-        Ok(Self { front, of_blocks: Vec::new(), behind: Vec::new(), has_exact: false })
+        front.extend(pages);
+        let index_pages = index.is_paged();
+        Ok(Self { front, of_blocks: Vec::new(), behind: Vec::new(), index_pages, has_exact: false })
     }
 
     /// Writes it; `put_blocks` puts all sections of the blocks. Returns the bytes of the file.
@@ -125,6 +140,7 @@ impl File {
             total: Some(total),
             tet_errors: mt.has_tet_errors(),
             sides: mt.regions().is_some_and(Regions::has_sides),
+            index_pages: self.index_pages,
             exact: self.has_exact,
         }))?;
         self.front.iter().try_for_each(|section| section.put(put))?;

@@ -123,7 +123,7 @@ impl<'a> BlockEncoder<'a> {
             }
         }
         let histograms = options.histograms.then(|| Histograms::of(&facts.volumes));
-        let mut file = File::begin(&mt, &models, (&options.metadata, histograms.as_ref()), blocks)?;
+        let mut file = File::begin(&mt, &models, (options, histograms.as_ref()), blocks)?;
         file.of_blocks = of_blocks;
         let bytes = file.write(&mt, writer, &mut |put| {
             (0..all).try_for_each(|block| put(&shelf.get(block).map_err(EncodeError::Write)?))

@@ -14,6 +14,9 @@ pub struct EncodeOptions {
     /// A histogram of each field over the reference mesh, some 160 bytes each, in front of the base mesh: see
     /// [`Decoder::histogram`](super::Decoder::histogram).
     pub histograms: bool,
+    /// log2 of the blocks of a page of the index, in files that have one: pages come by themselves where a client needs them. More than 20 means no
+    /// pages. None: pages where the index is longer than 32 KiB, as large as they must be for the list of them to be short.
+    pub index_page_bits: Option<u32>,
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
     pub metadata: BTreeMap<String, String>,
 }

@@ -18,6 +18,8 @@ const CRITICAL_FLAGS: u32 = 0xFFFF;
 const TET_ERRORS: u32 = 1;
 /// And: vertices have values for each region.
 const SIDES: u32 = 1 << 1;
+/// And: the index is in pages.
+const INDEX_PAGES: u32 = 1 << 2;
 /// A hint in files without an index: exact values stand behind the updates.
 const EXACT: u32 = 1 << 16;
 
@@ -30,6 +32,8 @@ pub struct Start {
     pub tet_errors: bool,
     /// Whether vertices have values for each region, as `regn` then says of which fields.
     pub sides: bool,
+    /// Whether the index is in pages, each a section of its own.
+    pub index_pages: bool,
     /// Whether exact values stand behind the updates, as far as the header says so: it does where there is no index.
     pub exact: bool,
 }
@@ -37,7 +41,8 @@ pub struct Start {
 /// A header.
 pub fn header(start: Start) -> [u8; HEADER_BYTES] {
     let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
-    let flags = flag(start.tet_errors, TET_ERRORS) | flag(start.sides, SIDES) | flag(start.exact, EXACT);
+    let critical = flag(start.tet_errors, TET_ERRORS) | flag(start.sides, SIDES);
+    let flags = critical | flag(start.index_pages, INDEX_PAGES) | flag(start.exact, EXACT);
     let mut bytes = [0; HEADER_BYTES];
     bytes[..8].copy_from_slice(&MAGIC);
     bytes[8..10].copy_from_slice(&VERSION.to_le_bytes());
@@ -67,7 +72,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
         return Err(FormatError::UnsupportedVersion { found, supported: VERSION });
     }
     let flags = u32_at(12);
-    if flags & CRITICAL_FLAGS & !(TET_ERRORS | SIDES) != 0 {
+    if flags & CRITICAL_FLAGS & !(TET_ERRORS | SIDES | INDEX_PAGES) != 0 {
         return Err(FormatError::UnsupportedFeature {
             offset: 12,
             what: "a flag that this reader does not know",
@@ -78,6 +83,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
         total: (total != 0).then_some(total),
         tet_errors: flags & TET_ERRORS != 0,
         sides: flags & SIDES != 0,
+        index_pages: flags & INDEX_PAGES != 0,
         exact: flags & EXACT != 0,
     })
 }
@@ -110,6 +116,8 @@ impl Kind {
     pub const MODL: Self = Self(*b"MODL");
     pub const BASE: Self = Self(*b"BASE");
     pub const FLDB: Self = Self(*b"FLDB");
+    /// A page of the index.
+    pub const IPAG: Self = Self(*b"IPAG");
     pub const FLDU: Self = Self(*b"FLDU");
     pub const UPDT: Self = Self(*b"UPDT");
     pub const INSV: Self = Self(*b"INSV");
@@ -121,7 +129,7 @@ impl Kind {
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
         let front = [Self::INFO, Self::INDX, Self::HIST, Self::BOUNDS, Self::EXTREMES, Self::REGIONS];
-        let head = [Self::MODL, Self::BASE, Self::FLDB];
+        let head = [Self::MODL, Self::BASE, Self::FLDB, Self::IPAG];
         let blocks = [Self::UPDT, Self::HALF, Self::FLDU, Self::INSV, Self::EXACT, Self::ENDF];
         front.contains(&self) || head.contains(&self) || blocks.contains(&self)
     }

@@ -37,4 +37,4 @@ pub use limits::Limits;
 #[doc(hidden)]
 pub use payload::exact::Corrections;
 #[doc(hidden)]
-pub use payload::index::{BlockInfo, Index};
+pub use payload::index::{BlockInfo, Index, IndexPage};

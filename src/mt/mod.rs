@@ -98,7 +98,7 @@ pub use mesh::limits::{MAX_LINK, MAX_STAR};
 pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
 pub(crate) use pages::updates_of_page;
-pub(crate) use reaches::{Extent, Reaches};
+pub(crate) use reaches::{Extent, Reaches, coarser_by};
 #[doc(hidden)]
 pub use regions::{BaseSides, MAX_REGIONS, further_regions, numbers_of};
 pub use regions::{RegionInfo, Regions};

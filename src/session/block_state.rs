@@ -8,6 +8,16 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// What a request can need by what the index says that it reaches, with the largest errors.
+#[derive(Debug, Default)]
+pub(super) struct Reached {
+    pub blocks: Vec<(ErrorCode, u32)>,
+    /// Pages of the index that are not here, some of whose blocks it may be.
+    pub pages: Vec<(ErrorCode, u32)>,
+    /// Pages that are here, whose blocks are among those above if they can be needed.
+    pub pages_here: Vec<u32>,
+}
+
 /// The blocks of a session; nothing of one that is fed from front to back.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
@@ -29,21 +39,26 @@ pub(super) struct Blocks {
     pub waiting: BTreeMap<u32, Vec<u8>>,
     /// What is to be here, most important first, as far as there is memory for it.
     pub plan: Vec<(f64, u32)>,
+    /// Pages of the index that are to be here.
+    pub pages: Vec<(f64, u32)>,
+    /// Bytes in memory of those that are here.
+    pub index_bytes: u64,
+    /// Those that have come for this request: they stay, or they would be asked for again.
+    pub pages_come: Vec<u32>,
     pub needed: u32,
     pub left_out: u32,
     /// Blocks that are needed and that the source does not have.
     pub absent: u32,
     /// The bytes that the source has, where those are a part of the file.
     pub held: Option<RangeSet>,
-    /// The number of the plan in which each block was needed last.
-    pub last_needed: Vec<u32>,
+    /// The number of the plan in which each block was needed last, if it ever was.
+    pub last_needed: BTreeMap<u32, u32>,
     pub plans: u32,
     /// The criterion of the request, and its budget.
     pub criterion: Option<Arc<dyn Criterion>>,
     pub budget: Budget,
-    /// Which blocks the request can need by what the index says that they reach, with their largest errors; none if its criterion cannot
-    /// tell.
-    pub reached: Option<Vec<(ErrorCode, u32)>>,
+    /// What the request can need; none if its criterion cannot tell.
+    pub reached: Option<Reached>,
     /// Blocks that a mesh needed all the same.
     pub missed: u32,
 }

@@ -5,7 +5,7 @@
 //! not need any more go when the memory that they may take is short.
 
 use super::Session;
-use super::block_state::Blocks;
+use super::block_state::{Blocks, Reached};
 use crate::format::{BlockInfo, DecodeOptions, Decoder, ErrorBytes, FormatError, Index};
 use crate::geom::Bounds;
 use crate::mt::{ErrorCode, Mt, MtInfo, MultiTessellation, UpdateId, UpdatePages};
@@ -27,13 +27,17 @@ pub struct BlockProgress {
     pub left_out: u32,
     /// Blocks of those that cannot come, since the source has a part of the file without them.
     pub absent: u32,
-    /// Bytes in memory of the blocks that are here, and of what waits to be put together.
+    /// Pages of the index; 0 where it has none.
+    pub index_pages: u32,
+    /// Those of them that are here.
+    pub index_pages_here: u32,
+    /// Bytes in memory of the blocks and of the pages of the index that are here, and of what waits to be put together.
     pub bytes: u64,
     /// Blocks that meshes needed although the index says that they cannot: always 0, unless the file or the planner is wrong.
     pub missed: u32,
 }
 
-/// A block of the file, in space.
+/// A block of the file, in space, or all blocks of a page of the index that is not here.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MappedBlock {
     /// A box, in units of the model, that holds all tetrahedra that its updates, and all that depend on them, remove or insert.
@@ -60,6 +64,10 @@ const FIRST_BYTES: u64 = 1 << 16;
 /// How many bytes in front of the blocks are asked for at a time at most: a multiple of [`FIRST_BYTES`]. A file may claim any length.
 const MAX_HEAD_BYTES: u64 = 16 << 20;
 
+/// Pages of the index go where they take more than this part of the memory that is there for blocks, beside that: where blocks are not tiny, their
+/// entries are less than a hundredth of them.
+const INDEX_PART: u64 = 16;
+
 /// How many bytes are asked for at a time where the file has to be read from end to end.
 const LATER_BYTES: u64 = 1 << 20;
 
@@ -78,7 +86,7 @@ impl Session {
     }
 
     /// The bytes of the file that give the mesh of the request again, or one that is as good as so many bytes of blocks allow: what stands in
-    /// front of the blocks, and of the blocks that were needed those with the largest errors. Of a file without blocks, all that has come. Ascending,
+    /// front of the blocks, the pages of the index that are here, and of the blocks that were needed those with the largest errors. Of a file without blocks, all that has come. Ascending,
     /// with something between any two.
     pub fn needed_bytes(&self, most: u64) -> Vec<Range<u64>> {
         let blocks = &self.blocks;
@@ -88,8 +96,7 @@ impl Session {
             return blocks.arrived.iter().cloned().collect();
         };
         let fields = self.decoder.wanted_fields();
-        let was_needed = |&block: &u32| blocks.last_needed.get(block as usize).is_some_and(|&plan| plan > 0);
-        let mut needed: Vec<u32> = (0..index.blocks.len() as u32).filter(was_needed).collect();
+        let mut needed: Vec<u32> = blocks.last_needed.keys().copied().collect();
         // All with larger errors come first, so that what there is has one bound.
         needed.sort_by_key(|&block| std::cmp::Reverse(errors_of(index, fields, block).into_iter().max()));
         let mut room = most;
@@ -99,12 +106,14 @@ impl Session {
             room = room.saturating_sub(bytes);
             fits
         });
-        let needed = RangeSet::of(ranges.flatten().chain(std::iter::once(0..head)).collect());
+        let pages = (0..).zip(index.pages()).filter(|(_, page)| page.is_here());
+        let pages = pages.filter_map(|(page, _)| self.decoder.index_page_range(page));
+        let needed = RangeSet::of(ranges.flatten().chain(pages).chain(std::iter::once(0..head)).collect());
         needed.iter().cloned().collect()
     }
 
     /// Which bytes of the file are wanted next, most important first: the more a block lowers the excess of the error for each of
-    /// its bytes. They may reach beyond the end of the file. None when all is here that the request needs. Only for sessions
+    /// its bytes, a page of the index as much as a block that it may have. They may reach beyond the end of the file. None when all is here that the request needs. Only for sessions
     /// [in parts](Session::in_parts).
     pub fn wanted(&self) -> Vec<WantedRange> {
         let blocks = &self.blocks;
@@ -115,9 +124,20 @@ impl Session {
             let held = blocks.within_held(blocks.fed..end);
             return held.map(|range| WantedRange { range, priority: f32::INFINITY }).into_iter().collect();
         }
-        let Some(mt) = self.decoder.mt().filter(|mt| mt.is_paged()) else { return Vec::new() };
+        let (Some(mt), Some(index)) = (self.decoder.mt().filter(|mt| mt.is_paged()), self.decoder.index())
+        else {
+            return Vec::new();
+        };
         let mut wanted = Vec::new();
+        let pages = blocks.pages.iter().filter(|(_, page)| !index.pages()[*page as usize].is_here());
+        let mut pages = pages.peekable();
+        let mut page_before = |priority: f64| {
+            let (priority, page) = *pages.next_if(|page| page.0 >= priority)?;
+            let range = blocks.rest_of(self.decoder.index_page_range(page)?);
+            Some(WantedRange { range, priority: priority as f32 })
+        };
         for &(priority, block) in &blocks.plan {
+            wanted.extend(std::iter::from_fn(|| page_before(priority)));
             let priority = priority as f32;
             if mt.has_page(block) || blocks.waiting.contains_key(&block) {
                 continue;
@@ -126,6 +146,7 @@ impl Session {
             let missing = ranges.filter(|range| !blocks.pieces.contains_key(&range.start));
             wanted.extend(missing.map(|range| WantedRange { range: blocks.rest_of(range), priority }));
         }
+        wanted.extend(std::iter::from_fn(|| page_before(f64::NEG_INFINITY)));
         wanted
     }
 
@@ -228,6 +249,17 @@ impl Session {
             return Ok(());
         }
         let (start, bytes) = self.blocks.with_beginning(start, bytes);
+        if let Some(page) = self.decoder.index_page_at(start) {
+            let length = self.decoder.index_page_range(page).map(|range| range.end - range.start);
+            if length != Some(bytes.len() as u64) {
+                return Ok(());
+            }
+            let bytes = bytes.into_owned();
+            self.blocks.beginning.take_if(|(at, _)| *at == start);
+            self.take_index_page(page, &bytes)?;
+            self.plan(false);
+            return Ok(());
+        }
         let Some(block) = self.decoder.block_at(start) else { return Ok(()) };
         let ranges = self.decoder.block_ranges(block);
         let fits = ranges.iter().any(|range| range.start == start && range.end - start == bytes.len() as u64);
@@ -247,12 +279,43 @@ impl Session {
         Ok(())
     }
 
-    /// Whole blocks may have come with what stands in front of them.
+    /// Takes a page of the index, unless it is here, and finds which of its blocks the request can need.
+    fn take_index_page(&mut self, page: u32, bytes: &[u8]) -> Result<(), FormatError> {
+        if self.decoder.index().is_none_or(|index| index.pages()[page as usize].is_here()) {
+            return Ok(());
+        }
+        self.decoder.take_index_page(page, bytes)?;
+        let (Some(index), Some(info)) = (self.decoder.index(), self.decoder.info()) else { return Ok(()) };
+        self.blocks.index_bytes += index.page_bytes(page);
+        self.blocks.pages_come.push(page);
+        if let (Some(criterion), Some(mut reached)) = (&self.blocks.criterion, self.blocks.reached.take()) {
+            let count = reached.pages.len();
+            reached.pages.retain(|&(_, other)| other != page);
+            let is_known = reached.pages.len() == count
+                || reach_page(&**criterion, index, info, self.decoder.wanted_fields(), page, &mut reached)
+                    .is_some();
+            self.blocks.reached = is_known.then_some(reached);
+        }
+        Ok(())
+    }
+
+    /// Whole pages of the index and whole blocks may have come with what stands in front of them.
     fn take_surplus(&mut self, start: u64, bytes: &[u8]) -> Result<(), FormatError> {
         let (Some(head), true) = (self.decoder.head_end(), self.decoder.takes_blocks()) else {
             return Ok(());
         };
         let end = start + bytes.len() as u64;
+        for page in 0.. {
+            let Some(range) = self.decoder.index_page_range(page) else { break };
+            if range.start < start {
+                return Ok(());
+            }
+            if range.end > end {
+                self.blocks.keep_beginning(&[range], start, bytes);
+                return Ok(());
+            }
+            self.take_index_page(page, &bytes[(range.start - start) as usize..(range.end - start) as usize])?;
+        }
         let mut block = 0;
         loop {
             let ranges = self.decoder.block_ranges(block);
@@ -304,20 +367,24 @@ impl Session {
     pub fn block_progress(&self) -> BlockProgress {
         let (blocks, paged) = (&self.blocks, self.decoder.mt().filter(|mt| mt.is_paged()));
         let Some(mt) = paged.filter(|_| blocks.in_parts) else { return BlockProgress::default() };
-        let count = self.decoder.index().map_or(0, |index| index.blocks.len() as u32);
+        let Some(index) = self.decoder.index() else { return BlockProgress::default() };
         let without_memory = blocks.waiting.len() as u32;
+        let pages = || index.pages().iter().filter(|_| index.is_paged());
         BlockProgress {
-            blocks: count,
-            here: (0..count).filter(|&block| mt.has_page(block)).count() as u32,
+            blocks: index.count(),
+            here: index.known().filter(|&(block, _)| mt.has_page(block)).count() as u32,
+            index_pages: pages().count() as u32,
+            index_pages_here: pages().filter(|page| page.is_here()).count() as u32,
             needed: blocks.needed,
             left_out: blocks.left_out + without_memory,
             absent: blocks.absent,
-            bytes: blocks.bytes_beside() + mt.page_bytes(),
+            bytes: blocks.bytes_beside() + blocks.index_bytes + mt.page_bytes(),
             missed: blocks.missed,
         }
     }
 
-    /// Where the blocks are, in the order of the file, and which of them are here; none where the file has no index.
+    /// Where the blocks are, in the order of the file, and which of them are here; none where the file has no index. Those of a page of
+    /// the index that is not here are one entry.
     pub fn block_map(&self) -> Vec<MappedBlock> {
         let paged = self.decoder.mt().filter(|mt| mt.is_paged());
         let (Some(mt), Some(index)) = (paged, self.decoder.index()) else { return Vec::new() };
@@ -333,8 +400,17 @@ impl Session {
             min: lattice.point([0, 1, 2].map(|k| min[k].clamp(low[k], high[k]))),
             max: lattice.point([0, 1, 2].map(|k| max[k].clamp(low[k], high[k]))),
         };
-        let blocks = (0..).zip(&index.blocks);
-        blocks.map(|(block, info)| MappedBlock { bounds: bounds(info.bounds), state: state(block) }).collect()
+        let mut map = Vec::new();
+        for (number, page) in (0..).zip(index.pages()) {
+            let block = |(block, info): (u32, &BlockInfo)| MappedBlock {
+                bounds: bounds(info.bounds),
+                state: state(block),
+            };
+            let all = || MappedBlock { bounds: bounds(page.all.bounds), state: BlockState::Missing };
+            map.extend(index.known_of(number).map(block));
+            map.extend((!page.is_here()).then(all));
+        }
+        map
     }
 
     /// Notes the criterion and the budget of a new request, and works out which blocks it needs as far as the index tells.
@@ -345,26 +421,29 @@ impl Session {
             let described = self.decoder.index().zip(self.decoder.info());
             blocks.reached = described.and_then(|(index, info)| reached(&*criterion, index, info, fields));
             (blocks.criterion, blocks.budget) = (Some(criterion), budget);
+            blocks.pages_come.clear();
             self.plan(false);
         }
     }
 
-    /// The blocks that the request can need by what the index says that they reach, with their priorities: of a request with a budget, as
-    /// many as that has room for. None if the criterion cannot tell, or if all of them do not fit the memory; then what there is of it is for
+    /// What the request can need by what the index says that it reaches, with priorities: of a request with a budget, as
+    /// much as that has room for. None if the criterion cannot tell, or if all of it does not fit the memory; then what there is of it is for
     /// what the mesh asks for.
-    fn plan_by_index(&self) -> Option<Vec<(f64, u32)>> {
+    fn plan_by_index(&self) -> Option<Plan> {
         let (index, mt, blocks) = (self.decoder.index()?, self.decoder.mt()?, &self.blocks);
         let reached = blocks.reached.as_ref()?;
-        let least = match updates_within(&blocks.budget, mt) {
+        let [least_of_pages, least] = match updates_within(&blocks.budget, mt) {
             Some(updates) => least_affordable(reached, updates, index, mt.info().updates),
-            None => ErrorCode::ZERO,
+            None => [ErrorCode::ZERO; 2],
         };
-        let weighed = |&(error, block): &(ErrorCode, u32)| {
-            (priority(f64::INFINITY, &[error], index.blocks[block as usize].len()), block)
-        };
-        let plan: Vec<(f64, u32)> =
-            reached.iter().filter(|&&(error, _)| error >= least).map(weighed).collect();
-        let bytes: u64 = plan.iter().map(|&(_, block)| mt.bytes_of_page(block)).sum();
+        let mut plan = Plan::default();
+        for &(error, block) in reached.blocks.iter().filter(|&&(error, _)| error >= least) {
+            plan.add(index, (block, f64::INFINITY), &[error]);
+        }
+        for &(error, page) in reached.pages.iter().filter(|&&(error, _)| error >= least_of_pages) {
+            plan.add(index, (index.blocks_of(page).start, f64::INFINITY), &[error]);
+        }
+        let bytes: u64 = plan.blocks.iter().map(|&(_, block)| mt.bytes_of_page(block)).sum();
         (bytes <= blocks.memory).then_some(plan)
     }
 
@@ -372,6 +451,10 @@ impl Session {
     /// stays as it is until then.
     fn plan(&mut self, mesh_has_moved: bool) {
         let by_index = self.plan_by_index();
+        if by_index.is_none() && self.decoder.index().is_some_and(Index::is_paged) {
+            // What does not fit the memory is asked for by the mesh from now on, so that no page stays for it.
+            self.blocks.reached = None;
+        }
         if by_index.is_none() && !mesh_has_moved {
             return;
         }
@@ -381,47 +464,53 @@ impl Session {
         };
         let (Some(criterion), Some(front)) = (&blocks.criterion, &self.front) else { return };
         blocks.plans += 1;
-        blocks.last_needed.resize(index.blocks.len(), 0);
         let fields = self.decoder.wanted_fields();
         let is_exhaustive = by_index.is_some() && blocks.budget.is_unlimited();
-        let mut plan = by_index.unwrap_or_default();
+        let Plan { blocks: mut plan, mut pages } = by_index.unwrap_or_default();
         let decoder = &self.decoder;
         let can_come =
             |held: &Blocks, block| mt.has_page(block) || held.can_come(&decoder.block_ranges(block));
-        if mesh_has_moved && plan.iter().all(|&(_, block)| mt.has_page(block) || !can_come(blocks, block)) {
-            let mut is_planned = vec![false; index.blocks.len()];
-            plan.iter().for_each(|&(_, block)| is_planned[block as usize] = true);
+        let page_can_come = |held: &Blocks, page| {
+            decoder.index_page_range(page).is_some_and(|range| held.can_come(std::slice::from_ref(&range)))
+        };
+        let is_here = plan.iter().all(|&(_, block)| mt.has_page(block) || !can_come(blocks, block));
+        if mesh_has_moved && is_here && !pages.iter().any(|&(_, page)| page_can_come(blocks, page)) {
             let asked = plan_by_mesh(front, mt, &**criterion, &blocks.budget, index, fields);
-            let more = asked.into_iter().filter(|&(_, block)| !is_planned[block as usize]);
-            let known = plan.len();
-            plan.extend(more);
+            let known = plan.len() + pages.len();
+            extend(&mut plan, asked.blocks);
+            extend(&mut pages, asked.pages);
             // The index has promised that there are none.
-            blocks.missed += if is_exhaustive { (plan.len() - known) as u32 } else { 0 };
+            blocks.missed += if is_exhaustive { (plan.len() + pages.len() - known) as u32 } else { 0 };
         }
-        plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
+        blocks.last_needed.extend(plan.iter().map(|&(_, block)| (block, blocks.plans)));
         // The most important ones first; those as important as they are in the file.
-        plan.sort_unstable_by(|(priority, block), (other, after)| {
-            other.total_cmp(priority).then(block.cmp(after))
-        });
-        blocks.needed = plan.len() as u32;
+        sort(&mut plan);
+        sort(&mut pages);
+        // Of a page that cannot come, any block may be needed.
+        let beyond = pages.iter().filter(|&&(_, page)| !page_can_come(blocks, page));
+        let beyond: u32 = beyond.map(|&(_, page)| index.blocks_of(page).len() as u32).sum();
+        pages.retain(|&(_, page)| page_can_come(blocks, page));
+        blocks.needed = plan.len() as u32 + beyond;
         plan.retain(|&(_, block)| can_come(blocks, block));
         let possible = plan.len() as u32;
         blocks.absent = blocks.needed - possible;
         // Pages with applied updates do not go: what comes has to fit beside them.
-        let mut taken: u64 = (0..index.blocks.len() as u32)
-            .filter(|&block| mt.has_page(block) && is_in_use(front, index, mt, block))
-            .map(|block| mt.bytes_of_page(block))
-            .sum();
-        let memory = blocks.memory;
-        plan.retain(|&(_, block)| {
+        let in_use =
+            index.known().filter(|&(block, _)| mt.has_page(block) && is_in_use(front, index, mt, block));
+        let mut taken: u64 = in_use.map(|(block, _)| mt.bytes_of_page(block)).sum();
+        let (memory, mut most_left_out) = (blocks.memory, f64::NEG_INFINITY);
+        plan.retain(|&(priority, block)| {
             taken += mt.bytes_of_page(block);
+            most_left_out = if taken <= memory { most_left_out } else { most_left_out.max(priority) };
             taken <= memory
         });
+        // There is no room for less important blocks, either.
+        pages.retain(|&(priority, _)| priority > most_left_out);
         blocks.left_out = possible - plan.len() as u32;
-        blocks.plan = plan;
-        let mut planned = vec![false; index.blocks.len()];
-        blocks.plan.iter().for_each(|&(_, block)| planned[block as usize] = true);
-        let is_planned = |block: u32| planned[block as usize];
+        (blocks.plan, blocks.pages) = (plan, pages);
+        let mut planned: Vec<u32> = blocks.plan.iter().map(|&(_, block)| block).collect();
+        planned.sort_unstable();
+        let is_planned = |block: u32| planned.binary_search(&block).is_ok();
         blocks.waiting.retain(|&block, _| is_planned(block));
         blocks.pieces.retain(|&start, _| decoder.block_at(start).is_some_and(is_planned));
     }
@@ -437,7 +526,8 @@ impl Session {
         Ok(())
     }
 
-    /// Drops blocks that the request does not need, until what is here and what is to come fit the memory.
+    /// Drops blocks that the request does not need, until what is here and what is to come fit the memory, and pages of the index that
+    /// nothing needs.
     fn free_memory(&mut self) {
         for block in self.blocks_to_drop() {
             let may_go = match (&mut self.front, self.decoder.mt()) {
@@ -449,16 +539,47 @@ impl Session {
                 return;
             }
         }
+        self.drop_index_pages();
+    }
+
+    /// Drops as many pages of the index as have to go, those first whose blocks have not been needed for longest.
+    fn drop_index_pages(&mut self) {
+        let (Some(mt), Some(index), Some(front)) = (self.decoder.mt(), self.decoder.index(), &self.front)
+        else {
+            return;
+        };
+        let mut excess = self.blocks.index_bytes.saturating_sub(self.blocks.memory / INDEX_PART);
+        if excess == 0 {
+            return;
+        }
+        let blocks = &self.blocks;
+        let mut leaving = leaving_pages(blocks, &blocks.plan, front, index, mt, |block| mt.has_page(block));
+        let age = |page: u32| blocks.last_needed.range(index.blocks_of(page)).map(|(_, &plan)| plan).max();
+        // Of the same age, the last ones of the file first.
+        leaving.sort_by_key(|&page| (age(page), std::cmp::Reverse(page)));
+        let gone = leaving.into_iter().map(|page| (page, index.page_bytes(page), index.blocks_of(page)));
+        for (page, bytes, of_page) in gone.collect::<Vec<_>>() {
+            if excess == 0 || !self.decoder.drop_index_page(page) {
+                return;
+            }
+            excess = excess.saturating_sub(bytes);
+            self.blocks.index_bytes -= bytes;
+            self.blocks.last_needed.retain(|block, _| !of_page.contains(block));
+        }
+    }
+
+    /// By how much what is here and what is to come exceed the memory.
+    fn excess_bytes(&self, mt: &Mt) -> u64 {
+        let coming = self.blocks.plan.iter().filter(|(_, block)| !mt.has_page(*block));
+        let coming: u64 = coming.map(|&(_, block)| mt.bytes_of_page(block)).sum();
+        (mt.page_bytes() + coming).saturating_sub(self.blocks.memory)
     }
 
     /// As many blocks as have to go, those first that have not been needed for longest. Those of which an update is applied stay.
     fn blocks_to_drop(&self) -> Vec<u32> {
         let mut leaving = Vec::new();
         let (Some(mt), Some(index)) = (self.decoder.mt(), self.decoder.index()) else { return leaving };
-        let blocks = &self.blocks;
-        let coming = blocks.plan.iter().filter(|(_, block)| !mt.has_page(*block));
-        let coming: u64 = coming.map(|&(_, block)| mt.bytes_of_page(block)).sum();
-        let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.memory);
+        let mut excess = self.excess_bytes(mt);
         if excess == 0 {
             return leaving;
         }
@@ -478,7 +599,7 @@ impl Session {
     /// The blocks here that the request does not need, those first that have not been needed for longest.
     fn unneeded(&self, mt: &Mt, index: &Index) -> Vec<u32> {
         let blocks = &self.blocks;
-        let mut is_needed = vec![false; index.blocks.len()];
+        let mut is_needed = vec![false; index.count() as usize];
         blocks.plan.iter().for_each(|&(_, block)| is_needed[block as usize] = true);
         // Blocks are asked for one by one; what they have shown must not be forgotten.
         if let (Some(front), Some(criterion)) = (&self.front, &blocks.criterion) {
@@ -487,9 +608,9 @@ impl Session {
             let telling = front.decisive_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
             telling.into_iter().for_each(|block| is_needed[block as usize] = true);
         }
-        let here = (0..index.blocks.len() as u32).filter(|&block| mt.has_page(block));
+        let here = index.known().map(|(block, _)| block).filter(|&block| mt.has_page(block));
         // Of the same age, the last ones of the file first.
-        let age = |block: u32| blocks.last_needed.get(block as usize).copied().unwrap_or(0);
+        let age = |block: u32| blocks.last_needed.get(&block).copied().unwrap_or(0);
         let unneeded = here.filter(|&block| !is_needed[block as usize]);
         let mut keys: Vec<u64> =
             unneeded.map(|block| u64::from(age(block)) << 32 | u64::from(!block)).collect();
@@ -505,8 +626,83 @@ fn is_in_use(front: &Front, index: &Index, mt: &Mt, block: u32) -> bool {
 
 /// The largest errors of the updates of a block, in these fields.
 fn errors_of(index: &Index, fields: &[usize], block: u32) -> Vec<ErrorCode> {
-    let errors = &index.blocks[block as usize].errors;
+    let errors = index.errors(block);
     fields.iter().map(|&f| errors[f]).collect()
+}
+
+/// What a request needs, each with its priority: blocks, and pages of the index that are not here.
+#[derive(Default)]
+struct Plan {
+    blocks: Vec<(f64, u32)>,
+    pages: Vec<(f64, u32)>,
+}
+
+impl Plan {
+    /// Adds a block with the excess of its error, or its page if that is not here, once for all of its blocks.
+    fn add(&mut self, index: &Index, (block, excess): (u32, f64), errors: &[ErrorCode]) {
+        let page = index.page_of(block);
+        match index.block(block) {
+            Some(known) => self.blocks.push((priority(excess, errors, known.len()), block)),
+            // Blocks of a page are about as long as each other.
+            None => {
+                let blocks = index.blocks_of(page).len().max(1) as u64;
+                let bytes = (index.pages()[page as usize].block_bytes / blocks).max(1);
+                let priority = priority(excess, errors, bytes);
+                match self.pages.last_mut() {
+                    Some((most, last)) if *last == page => *most = most.max(priority),
+                    _ => self.pages.push((priority, page)),
+                }
+            }
+        }
+    }
+}
+
+/// Adds what is not there.
+fn extend(plan: &mut Vec<(f64, u32)>, more: Vec<(f64, u32)>) {
+    let mut known: Vec<u32> = plan.iter().map(|&(_, number)| number).collect();
+    known.sort_unstable();
+    plan.extend(more.into_iter().filter(|(_, number)| known.binary_search(number).is_err()));
+}
+
+fn sort(plan: &mut [(f64, u32)]) {
+    plan.sort_unstable_by(|(priority, number), (other, after)| {
+        other.total_cmp(priority).then(number.cmp(after))
+    });
+}
+
+/// The pages of the index that nothing needs: the request does not reach them and has not asked for them, no block of them is to be here or `stays`, and no tetrahedron of the
+/// mesh is removed by an update of them.
+fn leaving_pages(
+    blocks: &Blocks,
+    plan: &[(f64, u32)],
+    front: &Front,
+    index: &Index,
+    mt: &Mt,
+    stays: impl Fn(u32) -> bool,
+) -> Vec<u32> {
+    if !index.is_paged() {
+        return Vec::new();
+    }
+    let mut is_kept = vec![false; index.pages().len()];
+    plan.iter().for_each(|&(_, block)| is_kept[index.page_of(block) as usize] = true);
+    let reached = blocks.reached.iter().flat_map(|reached| &reached.pages_here);
+    reached.chain(&blocks.pages_come).for_each(|&page| is_kept[page as usize] = true);
+    let awaited = (0..front.mesh().tet_slots() as u32).filter_map(|t| mt.awaited(front.mesh(), t));
+    awaited.for_each(|u| {
+        // A damaged file may name any update.
+        if let Some(is_kept) = is_kept.get_mut(index.page_of(u.0 >> index.block_bits) as usize) {
+            *is_kept = true;
+        }
+    });
+    index.known().filter(|&(block, _)| stays(block)).for_each(|(block, _)| {
+        is_kept[index.page_of(block) as usize] = true;
+    });
+    (0..)
+        .zip(index.pages())
+        .filter(|(_, page)| page.is_here())
+        .map(|(page, _)| page)
+        .filter(|&page| !is_kept[page as usize])
+        .collect()
 }
 
 /// What a block promises for each of its bytes, given how often the error that it lowers exceeds what is wanted.
@@ -517,45 +713,86 @@ fn priority(excess: f64, errors: &[ErrorCode], bytes: u64) -> f64 {
     gain / bytes as f64
 }
 
-/// Of a file with this index, the blocks that a criterion can need by what they reach, with their largest errors; none if it cannot tell.
-fn reached(
+/// Of a file with this index, what a criterion can need by what the index says that it reaches; none if it cannot tell.
+fn reached(criterion: &dyn Criterion, index: &Index, info: &MtInfo, fields: &[usize]) -> Option<Reached> {
+    let mut reached = Reached::default();
+    for (number, page) in (0..).zip(index.pages()) {
+        let first = index.blocks_of(number).start;
+        // Where the index is not paged, the blocks are asked one by one.
+        if index.is_paged() && !may_need(criterion, index, info, fields, (first, &page.all))? {
+            continue;
+        }
+        if page.is_here() {
+            reach_page(criterion, index, info, fields, number, &mut reached)?;
+        } else {
+            reached.pages.push((largest(&page.all, fields), number));
+        }
+    }
+    Some(reached)
+}
+
+/// Adds the blocks of a page that is here.
+fn reach_page(
     criterion: &dyn Criterion,
     index: &Index,
     info: &MtInfo,
     fields: &[usize],
-) -> Option<Vec<(ErrorCode, u32)>> {
-    let mut needed = Vec::new();
-    for block in 0..index.blocks.len() as u32 {
-        let errors = errors_of(index, fields, block);
-        let BlockInfo { bounds, ranges, regions, .. } = &index.blocks[block as usize];
-        let ranges: Vec<[i32; 2]> = fields.iter().map(|&f| ranges[f]).collect();
-        let first = UpdateId(index.updates(block, info.updates).start);
-        if criterion.may_need(&BlockData {
-            bounds: *bounds,
-            ranges: &ranges,
-            errors: &errors,
-            first,
-            regions,
-        })? {
-            needed.push((errors.into_iter().max().unwrap_or(ErrorCode::ZERO), block));
+    page: u32,
+    reached: &mut Reached,
+) -> Option<()> {
+    for (block, of_block) in index.known_of(page) {
+        if may_need(criterion, index, info, fields, (block, of_block))? {
+            reached.blocks.push((largest(of_block, fields), block));
         }
     }
-    Some(needed)
+    reached.pages_here.push(page);
+    Some(())
 }
 
-/// The least error above which blocks have no more than so many of the updates of an MT.
-fn least_affordable(reached: &[(ErrorCode, u32)], most: u64, index: &Index, updates: u32) -> ErrorCode {
+/// The largest error of a block in these fields.
+fn largest(block: &BlockInfo, fields: &[usize]) -> ErrorCode {
+    fields.iter().map(|&f| block.errors[f]).max().unwrap_or(ErrorCode::ZERO)
+}
+
+/// Whether a criterion can need a block, or any of the blocks from `block` on of which `BlockInfo` is true.
+fn may_need(
+    criterion: &dyn Criterion,
+    index: &Index,
+    info: &MtInfo,
+    fields: &[usize],
+    (block, BlockInfo { bounds, ranges, errors, regions, .. }): (u32, &BlockInfo),
+) -> Option<bool> {
+    let errors: Vec<ErrorCode> = fields.iter().map(|&f| errors[f]).collect();
+    let ranges: Vec<[i32; 2]> = fields.iter().map(|&f| ranges[f]).collect();
+    let first = UpdateId(index.updates(block, info.updates).start);
+    criterion.may_need(&BlockData { bounds: *bounds, ranges: &ranges, errors: &errors, first, regions })
+}
+
+/// The least error above which there are no more than so many of the updates of an MT: for pages of the index that are not here, if each has
+/// a single block with its largest error, and for blocks, if all of them have it. These are the same once the pages that matter are here.
+fn least_affordable(reached: &Reached, most: u64, index: &Index, updates: u32) -> [ErrorCode; 2] {
     // In the index, errors have eight bits.
-    let mut updates_of = [0_u64; 256];
-    for &(error, block) in reached {
-        updates_of[usize::from(error.0 >> 8)] += index.updates(block, updates).len() as u64;
+    let mut updates_of = [[0_u64; 256]; 2];
+    let mut add = |error: ErrorCode, counts: [u64; 2]| {
+        for (sums, count) in updates_of.iter_mut().zip(counts) {
+            sums[usize::from(error.0 >> 8)] += count;
+        }
+    };
+    for &(error, block) in &reached.blocks {
+        add(error, [index.updates(block, updates).len() as u64; 2]);
     }
-    let mut sum = 0;
-    let affordable = (0..256).rev().take_while(|&byte| {
-        sum += updates_of[byte];
-        sum <= most
-    });
-    affordable.last().map_or(ErrorCode::MAX, |byte| ErrorCode((byte as u16) << 8))
+    for &(error, page) in &reached.pages {
+        let all = index.blocks_of(page);
+        add(error, [1, all.len() as u64].map(|blocks| blocks << index.block_bits));
+    }
+    updates_of.map(|updates_of| {
+        let mut sum = 0;
+        let affordable = (0..256).rev().take_while(|&byte| {
+            sum += updates_of[byte];
+            sum <= most
+        });
+        affordable.last().map_or(ErrorCode::MAX, |byte| ErrorCode((byte as u16) << 8))
+    })
 }
 
 /// About twice as many updates as a budget has room for: of the blocks with the largest errors, not all are applied.
@@ -579,7 +816,8 @@ fn plan_by_mesh(
     budget: &Budget,
     index: &Index,
     fields: &[usize],
-) -> Vec<(f64, u32)> {
+) -> Plan {
+    let mut plan = Plan::default();
     if let Some(tolerances) = criterion.uniform().filter(|_| budget.is_unlimited()) {
         let asks = |errors: &[ErrorCode]| {
             tolerances.iter().any(|tolerance| match tolerance.field {
@@ -587,23 +825,23 @@ fn plan_by_mesh(
                 None => errors.iter().any(|&error| error > tolerance.error),
             })
         };
-        let blocks = (0..index.blocks.len() as u32).map(|block| (block, errors_of(index, fields, block)));
-        let needed = blocks.filter(|(_, errors)| asks(errors));
-        return needed
-            .map(|(block, errors)| {
-                (priority(f64::INFINITY, &errors, index.blocks[block as usize].len()), block)
-            })
-            .collect();
+        let missing = (0..).zip(index.pages()).filter(|(_, page)| !page.is_here());
+        let missing = missing.map(|(page, _)| index.blocks_of(page).start);
+        for block in index.known().map(|(block, _)| block).chain(missing) {
+            let errors = errors_of(index, fields, block);
+            if asks(&errors) {
+                plan.add(index, (block, f64::INFINITY), &errors);
+            }
+        }
+        return plan;
     }
     let demanded = front.demanded_pages(mt, criterion, |u| u.0 >> index.block_bits);
     // Under a budget, what is here comes first if it exceeds its error by more.
     let least = if budget.is_unlimited() { 1.0 } else { front.largest_present_excess(mt, criterion) };
-    let known = demanded
-        .into_iter()
-        .filter(|&(block, excess)| (block as usize) < index.blocks.len() && excess >= least);
-    known
-        .map(|(block, excess)| {
-            (priority(excess, &errors_of(index, fields, block), index.blocks[block as usize].len()), block)
-        })
-        .collect()
+    for (block, excess) in
+        demanded.into_iter().filter(|&(block, excess)| block < index.count() && excess >= least)
+    {
+        plan.add(index, (block, excess), &errors_of(index, fields, block));
+    }
+    plan
 }

@@ -37,7 +37,7 @@ fn the_index_tells_the_truth() {
         let mut decoder = Decoder::default();
         decoder.feed(&bytes).expect("a good file");
         let index = decoder.index().expect("an index").clone();
-        assert_eq!(index.blocks.len(), 19);
+        assert_eq!(index.count(), 19);
         let mt = decoder.mt().expect("a base mesh");
         let explicit = ExplicitMt::of(mt).expect("a valid MT");
         // The blocks of each update and of all that it depends on: all of them reach it.
@@ -55,10 +55,11 @@ fn the_index_tells_the_truth() {
                         && levels.all(|(level, range)| range[0] <= *level && *level <= range[1])
                 };
                 let mut vertices = tets.iter().filter_map(|&t| mesh.tet(t)).flatten();
-                vertices.all(|v| blocks.iter().all(|&block| fits(&index.blocks[block], v)))
+                vertices
+                    .all(|v| blocks.iter().all(|&block| fits(index.block(block as u32).expect("a block"), v)))
             };
             for &block in &blocks {
-                let errors = &index.blocks[block].errors;
+                let errors = index.errors(block as u32);
                 assert!((0..errors.len()).all(|f| mt.error_of_field(u, f) <= errors[f]), "{u:?}");
             }
             let tets = mt.find_removed(&mut mesh, u).expect("a valid MT");

@@ -7,6 +7,7 @@ mod extremes;
 mod facts;
 mod golden;
 mod histograms;
+mod paged;
 mod reader;
 mod reference;
 mod reference_kinds;

@@ -44,7 +44,12 @@ fn built(mesh: TetMesh, within: f64) -> Mt {
 }
 
 fn written(mt: &Mt) -> Vec<u8> {
-    encode(mt, &EncodeOptions { histograms: true, ..EncodeOptions::default() }).expect("a complete MT")
+    written_in_pages(mt, None)
+}
+
+fn written_in_pages(mt: &Mt, index_page_bits: Option<u32>) -> Vec<u8> {
+    let options = EncodeOptions { histograms: true, index_page_bits, ..EncodeOptions::default() };
+    encode(mt, &options).expect("a complete MT")
 }
 
 /// The region of each tetrahedron, by its vertices.
@@ -69,9 +74,9 @@ fn of_reader(mesh: &Mesh<'_>) -> OfTets {
 
 #[test]
 fn a_second_reader_finds_the_same_regions_in_every_mesh() {
-    for within in [0.0, 0.05] {
+    for (within, pages) in [(0.0, None), (0.05, None), (0.0, Some(1))] {
         let mt = labelled(within);
-        let bytes = written(&mt);
+        let bytes = written_in_pages(&mt, pages);
         let (file, parts) = reader::open(&bytes);
         let (own, read) = (mt.regions().expect("regions"), file.regions.as_ref().expect("the section"));
         assert_eq!((&read.arrays, read.deviation, &read.of_base), (&own.arrays, own.deviation, &own.of_base));
@@ -109,7 +114,7 @@ type AtCorners = BTreeMap<[u32; 4], Vec<Vec<i32>>>;
 
 #[test]
 fn a_second_reader_finds_the_values_of_each_region() {
-    for within in [0.0, 0.05] {
+    for (within, pages) in [(0.0, None), (0.05, None), (0.0, Some(1))] {
         let mut mesh = labelled_mesh();
         let own =
             |label: f64, t: usize| 0.01 * label + ((t * t) % 17) as f64 * if label < 0.0 { 0.3 } else { 0.0 };
@@ -117,7 +122,7 @@ fn a_second_reader_finds_the_values_of_each_region() {
         mesh.cell_fields.push(Field::new("stress", stress));
         mesh.settle_cells(CellsToPoints::ByRegion, &["material".into(), "slab".into()]);
         let mt = built(mesh, within);
-        let bytes = written(&mt);
+        let bytes = written_in_pages(&mt, pages);
         let (file, parts) = reader::open(&bytes);
         let regions = file.regions.as_ref().expect("the section");
         assert_eq!(regions.jumps, mt.regions().expect("regions").sides.jumps);

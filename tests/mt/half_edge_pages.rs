@@ -170,7 +170,7 @@ fn demanded_pages_are_enough_and_all_in_use() {
                 .map(move |f| updates.clone().map(|u| whole.errors(UpdateId(u))[f]).max().expect("an update"))
         });
         let bounds = bounds.collect();
-        paged.mt.set_page_bounds(bounds);
+        paged.mt.set_page_bounds(0, bounds);
         for _ in 0..6 {
             let request = request(&paged.subject, &mut random);
             let criterion = LodCriterion::new(paged.mt.info(), &request);

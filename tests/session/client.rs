@@ -95,8 +95,8 @@ fn meshes_and_bounds_are_those_of_the_whole_file() {
         assert_eq!(client.session().fetched(), given.get());
         // But for the block of which the first request brought a part.
         let index = client.session().decoder().index();
-        let blocks = index.into_iter().flat_map(|index| &index.blocks);
-        let largest = blocks.map(tetralod::format::BlockInfo::len).max().unwrap_or(0);
+        let blocks = index.into_iter().flat_map(|index| index.known());
+        let largest = blocks.map(|(_, block)| block.len()).max().unwrap_or(0);
         assert!(given.get() <= file.len() as u64 + largest, "nothing is fetched twice: {}", given.get());
     }
 }

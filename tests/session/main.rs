@@ -9,6 +9,7 @@ mod first_picture;
 mod hostile;
 mod kinds;
 mod network;
+mod paged;
 mod parts;
 mod quantity;
 mod regions;

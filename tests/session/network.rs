@@ -115,11 +115,12 @@ fn a_long_index_takes_no_more_rounds_than_a_short_one() {
         mesh.fields.push(Field::new(format!("field {number}"), values));
     }
     let mt = many_blocks(&mesh);
-    let long_index = EncodeOptions::default();
+    // Not in pages.
+    let long_index = EncodeOptions { index_page_bits: Some(u32::MAX), ..EncodeOptions::default() };
     let notes = |count| (0..count).map(|note: u32| (note.to_string(), "a".repeat(60_000))).collect();
-    let long_both = EncodeOptions { metadata: notes(3), ..EncodeOptions::default() };
+    let long_both = EncodeOptions { metadata: notes(3), ..long_index.clone() };
     // The index begins at the end of what is asked for at first.
-    let late_index = EncodeOptions { metadata: notes(1), ..EncodeOptions::default() };
+    let late_index = EncodeOptions { metadata: notes(1), ..long_index.clone() };
     for (options, most_rounds) in [(long_index, 2), (late_index, 2), (long_both, 3)] {
         let file = encode(&mt, &options).expect("a sound MT");
         let mut whole = Session::new();

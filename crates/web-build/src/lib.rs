@@ -231,7 +231,13 @@ impl MeshBuilder {
         stages.begin("encode")?;
         let built_by = config.construction.metadata().into_iter().chain(level.metadata());
         let metadata = built_by.chain(metadata).collect();
-        let encoding = EncodeOptions { check_margins: true, exact: built.exact, histograms: true, metadata };
+        let encoding = EncodeOptions {
+            check_margins: true,
+            exact: built.exact,
+            histograms: true,
+            metadata,
+            index_page_bits: None,
+        };
         let bytes = encode(&built.mt, &encoding)?;
         let (repaired, repair) =
             repaired.map_or_else(Default::default, |(done, repair)| (done.to_string(), Some(repair)));

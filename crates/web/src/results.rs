@@ -51,7 +51,7 @@ pub fn progress(progress: &Progress) -> JsProgress {
 
 /// How the blocks stand, for JavaScript.
 pub fn blocks(progress: &BlockProgress) -> JsBlocks {
-    let BlockProgress { blocks, here, needed, left_out, absent, bytes, missed } = *progress;
+    let BlockProgress { blocks, here, needed, left_out, absent, bytes, missed, .. } = *progress;
     let [all, here, needed, left_out, absent, missed] =
         [blocks, here, needed, left_out, absent, missed].map(f64::from);
     let names = ["all", "here", "needed", "leftOut", "absent", "bytes", "missed"];

@@ -10,12 +10,13 @@ use std::ops::Range;
 
 impl Decoder {
     /// The bytes of the file that hold a block of a half-edge MT with the wanted fields, in ranges that do not touch; empty if there is
-    /// no such block.
+    /// no such block, or the page of the index that has it is not here.
     pub fn block_ranges(&self, block: u32) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         let Some(index) = &self.head.index else { return ranges };
-        let before = self.head.block_starts.get(block as usize).copied();
-        let (Some(info), Some(before)) = (index.blocks.get(block as usize), before) else { return ranges };
+        let (Some(info), Some(before)) = (index.block(block), index.block_start(block)) else {
+            return ranges;
+        };
         let Some(mut at) = self.head_end().and_then(|end| end.checked_add(before)) else { return ranges };
         for (part, &length) in info.lengths.iter().enumerate() {
             let Some(end) = at.checked_add(u64::from(length)) else { return Vec::new() };
@@ -30,7 +31,8 @@ impl Decoder {
         ranges
     }
 
-    /// Where the blocks begin in the file, or a byte behind where less is known; none before the index is there.
+    /// Where the blocks begin in the file, or the pages of the index in front of these, or a byte behind where less is known; none before the
+    /// index is there.
     pub fn head_end(&self) -> Option<u64> {
         let index = self.head.index.as_ref()?;
         self.head.index_at.end.checked_add(index.shared)
@@ -60,7 +62,7 @@ impl Decoder {
 
     /// The bytes of the file behind the blocks of a half-edge MT, where exact values are; none if there are none, or that is not known yet.
     pub fn exact_range(&self) -> Option<Range<u64>> {
-        let start = self.head_end()?.checked_add(*self.head.block_starts.last()?)?;
+        let start = self.head_end()?.checked_add(self.head.index.as_ref()?.end())?;
         let end = self.total?.checked_sub(END_BYTES as u64)?;
         (start < end).then_some(start..end)
     }
@@ -120,8 +122,51 @@ impl Decoder {
     /// The block of which a range of [`Decoder::block_ranges`] begins at this byte of the file.
     pub fn block_at(&self, start: u64) -> Option<u32> {
         let behind = start.checked_sub(self.head_end()?)?;
-        let block = self.head.block_starts.partition_point(|&start| start <= behind).checked_sub(1)? as u32;
+        let block = self.head.index.as_ref()?.block_with(behind)?;
         self.block_ranges(block).iter().any(|range| range.start == start).then_some(block)
+    }
+
+    /// The bytes of the file that hold a page of the index; none if there is no such page, or all of the index is in one section.
+    pub fn index_page_range(&self, page: u32) -> Option<Range<u64>> {
+        let (head, range) = (self.head_end()?, self.head.index.as_ref()?.page_range(page)?);
+        Some(head.checked_add(range.start)?..head.checked_add(range.end)?)
+    }
+
+    /// The page of the index whose bytes begin there.
+    pub fn index_page_at(&self, start: u64) -> Option<u32> {
+        self.head.index.as_ref()?.page_at(start.checked_sub(self.head_end()?)?)
+    }
+
+    /// Takes in a page of the index: the bytes of [`Decoder::index_page_range`]. Its blocks can be taken from then on.
+    ///
+    /// # Errors
+    /// When the bytes are damaged, or the page cannot be taken now; nothing has changed then.
+    pub fn take_index_page(&mut self, page: u32, bytes: &[u8]) -> Result<(), FormatError> {
+        let Some(range) = self.index_page_range(page).filter(|_| self.takes_blocks()) else {
+            return Err(self.corrupt("there is no such page of the index, or not yet"));
+        };
+        let corrupt = |what| FormatError::Corrupt { offset: range.start, what };
+        let short = || corrupt("a page of the index is shorter than the index says");
+        let FoundSection { kind, content, behind } = find_section(bytes, range.start, short)?;
+        if kind != Kind::IPAG {
+            return Err(corrupt("a section is out of place"));
+        }
+        if !behind.is_empty() || bytes.len() as u64 != range.end - range.start {
+            return Err(corrupt("a page of the index is not as long as the index says"));
+        }
+        self.read_index_page(content, page)
+    }
+
+    /// Forgets a page of the index, of whose blocks none is here; false if one is, or there is no such page.
+    pub fn drop_index_page(&mut self, page: u32) -> bool {
+        let (Some(mt), Some(index)) = (&self.mt, &mut self.head.index) else { return false };
+        let is_there = index.is_paged() && (page as usize) < index.pages().len();
+        if !is_there || index.blocks_of(page).any(|block| mt.has_page(block)) {
+            return false;
+        }
+        index.drop_page(page);
+        self.tell_bounds(page);
+        true
     }
 
     /// Takes in a whole block of a half-edge MT: the bytes of [`Decoder::block_ranges`], one after the other. The blocks on which it

@@ -2,6 +2,7 @@
 
 use super::Decoder;
 use crate::mt::{ErrorCode, FieldInfo};
+use std::ops::Range;
 
 /// A mesh of which error can be had for how many bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +28,9 @@ impl Decoder {
     /// `fetched` bytes from the start of the file come whatever is asked for, if what stands in front of the blocks is not longer.
     ///
     /// Files of half-edge MTs come by blocks: these are the bytes of exactly the blocks that
-    /// [`Session::wanted`](crate::session::Session::wanted) names for such a request of a new session, with the wanted fields. Files of other kinds come
+    /// [`Session::wanted`](crate::session::Session::wanted) names for such a request of a new session, with the wanted fields. Where
+    /// the index is in pages, pages that such a request needs count, too, and of a page that is not here all blocks count as long as the page's largest
+    /// error is above that of the mesh: it is no less than what comes. Files of other kinds come
     /// from front to back and do not say before what is where: the only entry is the whole file.
     pub fn bytes_by_error(&self, place: usize, fetched: u64) -> Vec<ErrorBytes> {
         let (Some(info), Some(&field)) = (&self.head.info, self.head.wanted.get(place)) else {
@@ -43,17 +46,29 @@ impl Decoder {
         self.head.wanted.iter().for_each(|&wanted| is_wanted[wanted] = true);
         // Codes in the index are multiples of 256, or all ones.
         let mut bytes_of = [0_u64; 256];
-        let mut at = head;
-        for block in &index.blocks {
-            let code = block.errors[field];
-            for (part, &length) in block.lengths.iter().enumerate() {
-                let end = at.saturating_add(u64::from(length));
-                if part == 0 || is_wanted[part - 1] {
-                    let missing = end.saturating_sub(at.max(fetched));
-                    let bytes = &mut bytes_of[usize::from(code.0 >> 8)];
-                    *bytes = bytes.saturating_add(missing);
-                }
+        let mut come = |code: ErrorCode, range: Range<u64>| {
+            let missing = range.end.saturating_sub(range.start.max(fetched));
+            let bytes = &mut bytes_of[usize::from(code.0 >> 8)];
+            *bytes = bytes.saturating_add(missing);
+        };
+        let mut at = index.first_block().saturating_add(head);
+        for (number, page) in (0..).zip(index.pages()) {
+            if let Some(Range { start, end }) = index.page_range(number) {
+                come(page.all.errors[field], head.saturating_add(start)..head.saturating_add(end));
+            }
+            if !page.is_here() {
+                let end = at.saturating_add(page.block_bytes);
+                come(page.all.errors[field], at..end);
                 at = end;
+            }
+            for (_, block) in index.known_of(number) {
+                for (part, &length) in block.lengths.iter().enumerate() {
+                    let end = at.saturating_add(u64::from(length));
+                    if part == 0 || is_wanted[part - 1] {
+                        come(block.errors[field], at..end);
+                    }
+                    at = end;
+                }
             }
         }
         let mut curve = Vec::new();

@@ -8,7 +8,7 @@ use crate::format::payload::kind_codec::{KindCodec, codec_of};
 use crate::format::payload::regions::RegionsHead;
 use crate::format::payload::{BaseParts, half_edge};
 use crate::format::read::Reader;
-use crate::format::{FormatError, Index};
+use crate::format::{BlockInfo, FormatError, Index};
 use crate::mt::{ErrorCode, Mt, MtInfo, UpdatePages};
 use std::ops::Range;
 
@@ -21,13 +21,13 @@ pub(super) struct FileHead {
     pub(super) wanted: Vec<usize>,
     /// In files of half-edge MTs.
     pub(super) index: Option<Index>,
-    /// For each block the bytes of the blocks in front of it; at last the bytes of all.
-    pub(super) block_starts: Vec<u64>,
     /// Where the index is in the file.
     pub(super) index_at: Range<u64>,
     pub(super) histograms: Option<Histograms>,
     /// Until the base mesh is there; then they are in the MT.
     pub(super) regions: Option<RegionsHead>,
+    /// How many there are, once these are known; 0 if the file has none.
+    pub(super) region_count: u32,
     /// For each field of the file whether it jumps at interfaces; empty if none does.
     pub(super) jumps: Vec<bool>,
     pub(super) models: Option<Models>,
@@ -95,12 +95,26 @@ impl FileHead {
     /// The largest errors that an update can have which is not in the MT, by wanted field.
     pub(super) fn largest_of_others(&self, mt: &Mt) -> Vec<ErrorCode> {
         let mut largest = vec![ErrorCode::ZERO; self.wanted.len()];
-        let blocks = self.index.iter().flat_map(|index| &index.blocks);
-        for (_, block) in (0..).zip(blocks).filter(|(page, _)| !mt.has_page(*page)) {
+        let Some(index) = &self.index else { return largest };
+        let mut include = |of: &BlockInfo| {
             for (error, &field) in largest.iter_mut().zip(&self.wanted) {
-                *error = (*error).max(block.errors[field]);
+                *error = (*error).max(of.errors[field]);
             }
-        }
+        };
+        // No block is here whose page is not.
+        index.pages().iter().filter(|page| !page.is_here()).for_each(|page| include(&page.all));
+        index.known().filter(|(block, _)| !mt.has_page(*block)).for_each(|(_, block)| include(block));
         largest
+    }
+
+    /// Of each block of a page of the index, what bounds its errors by wanted field; one bound for all as long as that is not here.
+    pub(super) fn bounds_of_page(&self, index: &Index, page: u32) -> Vec<ErrorCode> {
+        let all = &index.pages()[page as usize];
+        let of = |block: &BlockInfo| self.wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
+        if all.is_here() {
+            index.known_of(page).flat_map(|(_, block)| of(block)).collect()
+        } else {
+            of(&all.all)
+        }
     }
 }

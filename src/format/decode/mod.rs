@@ -213,7 +213,7 @@ impl Decoder {
         let bounds = match &self.head.index {
             None => Some([[0; 3], [1 << info.lattice.bits; 3]]),
             Some(index) => {
-                let blocks = index.blocks.iter().flat_map(|block| block.bounds);
+                let blocks = index.pages().iter().flat_map(|page| page.all.bounds);
                 lattice_box(mt.base().positions.iter().copied().chain(blocks))
             }
         };

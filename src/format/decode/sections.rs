@@ -12,7 +12,7 @@ use crate::format::payload::histogram::Histograms;
 use crate::format::payload::kind_codec::codec_of;
 use crate::format::payload::{FieldPart, bounds, extremes, regions};
 use crate::format::read::Reader;
-use crate::format::{BlockInfo, FormatError, Index, payload};
+use crate::format::{FormatError, Index, payload};
 use crate::mt::{Mt, MtInfo, MultiTessellation, UpdatePages, updates_of_page};
 use std::ops::Range;
 
@@ -29,7 +29,8 @@ impl Decoder {
             Kind::MODL => self.open_models(content)?,
             Kind::BASE => self.open_base(content)?,
             Kind::FLDB => self.open_base_field(content)?,
-            Kind::HALF if self.block.is_none() && self.takes_blocks() => {
+            Kind::IPAG => self.open_index_page(content)?,
+            Kind::HALF if self.block.is_none() && self.takes_blocks() && self.has_whole_index() => {
                 let open = self.read_shared(content, None)?;
                 self.next_block += 1;
                 self.block = Some(open);
@@ -62,6 +63,10 @@ impl Decoder {
             let what = "errors of tetrahedra in an MT of a kind that has none";
             return Err(FormatError::UnsupportedFeature { offset, what });
         }
+        if self.head.start.index_pages && !info.kind.is_paged() {
+            let what = "an index in pages in an MT of a kind that has none";
+            return Err(FormatError::UnsupportedFeature { offset, what });
+        }
         let names = &self.options.fields;
         if let Some(name) = names.iter().find(|name| !info.fields.iter().any(|field| field.name == **name)) {
             let known = info.fields.iter().map(|field| field.name.clone()).collect();
@@ -83,17 +88,47 @@ impl Decoder {
     }
 
     pub(super) fn open_index(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
-        let FileHead { info: Some(info), index: index @ None, block_starts, .. } = &mut self.head else {
+        let FileHead { info: Some(info), index: index @ None, start: of_file, .. } = &mut self.head else {
             return Err(content.out_of_place());
         };
         if !info.kind.is_paged() {
             return Err(content.out_of_place());
         }
         let start = self.bytes - (HEAD_BYTES + content.len()) as u64;
-        let index = index.insert(Index::read(content, info)?);
-        *block_starts = index.block_starts();
+        *index = Some(Index::read(content, info, of_file.index_pages)?);
         self.head.index_at = start..self.bytes;
         Ok(())
+    }
+
+    /// The next page of the index, where the file comes in order.
+    fn open_index_page(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let pages = self.head.index.as_ref().filter(|index| index.is_paged()).map(Index::pages);
+        let next = pages.and_then(|pages| pages.iter().position(|page| !page.is_here()));
+        match next.filter(|_| self.takes_blocks()) {
+            Some(page) => self.read_index_page(content, page as u32),
+            None => Err(content.out_of_place()),
+        }
+    }
+
+    /// Reads a page of the index, behind the base mesh.
+    pub(super) fn read_index_page(&mut self, content: Reader<'_>, page: u32) -> Result<(), FormatError> {
+        let FileHead { info: Some(info), index: Some(index), region_count, .. } = &mut self.head else {
+            return Err(content.out_of_place());
+        };
+        index.read_page(content, page, info, *region_count)?;
+        self.tell_bounds(page);
+        Ok(())
+    }
+
+    /// Tells the MT what bounds the errors of the blocks of a page of the index.
+    pub(super) fn tell_bounds(&mut self, page: u32) {
+        if let (Some(Mt::HalfEdge(mt)), Some(index)) = (&mut self.mt, &self.head.index) {
+            mt.set_page_bounds(page, self.head.bounds_of_page(index, page));
+        }
+    }
+
+    fn has_whole_index(&self) -> bool {
+        self.head.index.as_ref().is_some_and(Index::is_whole)
     }
 
     pub(super) fn open_histograms(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
@@ -140,6 +175,7 @@ impl Decoder {
             info: Some(info),
             index: Some(index),
             regions: regions @ None,
+            region_count,
             models: None,
             jumps,
             ..
@@ -149,6 +185,7 @@ impl Decoder {
         };
         let mut found = regions::read(content, info, index, has_sides)?;
         *jumps = std::mem::take(&mut found.jumps);
+        *region_count = found.count();
         *regions = Some(found);
         Ok(())
     }
@@ -206,10 +243,10 @@ impl Decoder {
                 mt.set_regions(regions)?;
             }
             if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
-                let wanted = &self.head.wanted;
-                let of_block =
-                    |block: &BlockInfo| wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
-                mt.set_page_bounds(index.blocks.iter().flat_map(of_block).collect());
+                mt.group_pages(index.log2_page());
+                for page in 0..index.pages().len() as u32 {
+                    mt.set_page_bounds(page, self.head.bounds_of_page(index, page));
+                }
             }
             (self.mt, self.in_order) = (Some(mt), in_order);
         }

@@ -1,7 +1,7 @@
-//! `regn`: the regions of the volume, those of the base tetrahedra, and which of them each block reaches.
+//! `regn`: the regions of the volume, those of the base tetrahedra, and which of them each block, or page of the index, reaches.
 
 use super::bounds;
-use super::index::Index;
+use super::index::{Index, read_region_number, read_regions, write_regions};
 use crate::format::read::{MAX_STRING, Reader};
 use crate::format::{EncodeError, FormatError, write};
 use crate::mt::{MAX_REGIONS, MtInfo, RegionInfo, Regions};
@@ -40,14 +40,7 @@ pub fn write(out: &mut Vec<u8>, regions: &Regions, index: &Index) -> Result<(), 
         write::varint(out, u64::from(run[0]));
         write::varint(out, run.len() as u64);
     }
-    for block in &index.blocks {
-        write::varint(out, block.regions.len() as u64);
-        let mut next = 0;
-        for &region in &block.regions {
-            write::varint(out, u64::from(region) - next);
-            next = u64::from(region) + 1;
-        }
-    }
+    index.region_lists().for_each(|list| write_regions(out, list));
     // Nothing where no field jumps.
     out.extend(regions.sides.jumps.iter().map(|&jumps| u8::from(jumps)));
     Ok(())
@@ -74,16 +67,10 @@ pub fn read(
     regions.deviation = read_amount(&mut reader)?;
     let mut runs = Vec::new();
     for _ in 0..reader.varint()? {
-        runs.push((read_number(&mut reader, 0, count)?, reader.varint()?));
+        runs.push((read_region_number(&mut reader, 0, count)?, reader.varint()?));
     }
-    for block in &mut index.blocks {
-        let (mut list, mut next) = (Vec::new(), 0);
-        for _ in 0..reader.varint()? {
-            let region = read_number(&mut reader, next, count)?;
-            list.push(region);
-            next = u32::from(region) + 1;
-        }
-        block.regions = list;
+    for list in index.region_lists_mut() {
+        *list = read_regions(&mut reader, count)?;
     }
     let mut jumps = Vec::new();
     for _ in info.fields.iter().filter(|_| has_sides) {
@@ -95,13 +82,6 @@ pub fn read(
     }
     reader.end()?;
     Ok(RegionsHead { regions, runs, jumps })
-}
-
-/// The number of a region: what is read, from `next` on.
-fn read_number(reader: &mut Reader<'_>, next: u32, count: u32) -> Result<u16, FormatError> {
-    let region = next.checked_add(reader.varint()?).filter(|&region| region < count);
-    let region = region.and_then(|region| u16::try_from(region).ok());
-    region.ok_or_else(|| reader.corrupt("there are not so many regions"))
 }
 
 fn read_amount(reader: &mut Reader<'_>) -> Result<f64, FormatError> {
@@ -124,6 +104,11 @@ fn read_region(reader: &mut Reader<'_>, arrays: usize, bits: u32) -> Result<Regi
 }
 
 impl RegionsHead {
+    /// How many regions there are.
+    pub fn count(&self) -> u32 {
+        self.regions.all.len() as u32
+    }
+
     /// The regions of an MT with so many base tetrahedra; none if these are others.
     pub fn of_base(mut self, tets: usize) -> Option<Regions> {
         let sum: u64 = self.runs.iter().map(|(_, length)| u64::from(*length)).sum();

@@ -82,8 +82,10 @@ pub struct HalfEdgeMt {
     pub(super) pages: Pages<HalfEdgePage>,
     /// The near vertex of each update, as far as the page that has it as a child is here.
     near: PagedArray<u32>,
-    /// Page by page and field by field, what bounds the errors of a page that is not here.
-    bounds: Vec<ErrorCode>,
+    /// Page by page and field by field, what bounds the errors of a page that is not here, in groups of `2^group_bits` pages; in a group of
+    /// which less is known, field by field.
+    bounds: Vec<Vec<ErrorCode>>,
+    group_bits: u32,
     /// One for each field.
     pub(super) zeros: Vec<ErrorCode>,
     pub(super) facts: Option<Box<MtFacts>>,
@@ -177,7 +179,8 @@ impl HalfEdgeMt {
             base_marks: marks,
             base_children: Rows::new(),
             near: PagedArray::new(NONE),
-            bounds: vec![ErrorCode::MAX; fields],
+            bounds: vec![vec![ErrorCode::MAX; fields]],
+            group_bits: 31,
             zeros: vec![ErrorCode::ZERO; fields],
             facts: None,
             regions: None,
@@ -360,19 +363,29 @@ impl HalfEdgeMt {
         Ok(())
     }
 
-    /// Tells what bounds the errors of the updates of each page, page by page and field by field, for as long as a page is not
-    /// here.
-    pub fn set_page_bounds(&mut self, bounds: Vec<ErrorCode>) {
-        self.bounds = bounds;
+    /// Tells that what bounds the errors of pages comes for groups of so many, by the base-2 logarithm.
+    pub fn group_pages(&mut self, log2: u32) {
+        (self.group_bits, self.bounds) = (log2.min(31), Vec::new());
+    }
+
+    /// Tells what bounds the errors of the updates of each page of a group, page by page and field by field, for as long as a page is not
+    /// here; of the whole group, field by field, if no more is known. Groups come in order first.
+    pub fn set_page_bounds(&mut self, group: u32, bounds: Vec<ErrorCode>) {
+        match self.bounds.get_mut(group as usize) {
+            Some(known) => *known = bounds,
+            None => self.bounds.push(bounds),
+        }
     }
 
     /// What bounds the errors of update `u`, field by field, which is not here.
     #[inline]
     pub(super) fn bounds_of(&self, u: UpdateId) -> &[ErrorCode] {
         let fields = self.zeros.len();
-        let at = self.pages.page_of(u.0) as usize * fields;
+        let page = self.pages.page_of(u.0);
+        let bounds = self.bounds.get((page >> self.group_bits) as usize).map_or(&[][..], Vec::as_slice);
+        let at = (page & ((1 << self.group_bits) - 1)) as usize * fields;
         // A page without bounds has those of the first entries.
-        self.bounds.get(at..at + fields).or_else(|| self.bounds.get(..fields)).unwrap_or(&self.zeros)
+        bounds.get(at..at + fields).or_else(|| bounds.get(..fields)).unwrap_or(&self.zeros)
     }
 
     /// For each base tetrahedron, what removes it.

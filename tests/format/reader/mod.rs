@@ -73,7 +73,9 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     };
     let mut info = wire::info(next(b"INFO").payload);
     let section = (info.kind == 3).then(|| next(b"INDX"));
-    let index = section.map(|section| wire::index(section.payload, &info));
+    let in_pages = file[12] & 4 == 4;
+    assert!(!in_pages || info.kind == 3);
+    let mut index = section.map(|section| wire::index(section.payload, &info, in_pages));
     let histograms = histogram::find(front, &info);
     let place = |kind: &[u8; 4]| front.iter().position(|section| &section.kind == kind);
     let bounds = place(b"bbox").map(|at| {
@@ -87,8 +89,9 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         wire::extremes(front[at].payload, &mut info);
     }
     let has_sides = file[12] & 2 == 2;
-    let blocks = index.as_ref().map_or(0, |index| index.blocks.len());
-    let regions = regions::find(front, &info, blocks, has_sides);
+    let pages = index.as_ref().and_then(|index| index.pages.as_ref()).map_or(0, |pages| pages.all.len());
+    let lists = index.as_ref().map_or(0, |index| if in_pages { pages } else { index.blocks.len() });
+    let mut regions = regions::find(front, &info, lists, has_sides);
     assert!(!has_sides || info.kind == 3 && regions.is_some());
     let tables = coded::tables(next(b"MODL").payload, info.kind);
     let mut payload = next(b"BASE").payload;
@@ -118,6 +121,25 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         let own = if jumps(field) { half_edge::base_sides(&mut coded, &sides) } else { BTreeMap::new() };
         base_sides.push(own);
         coded.end();
+    }
+    let mut end_of_head = None;
+    let mut end_of_pages = 0;
+    if let Some(index) = index.as_mut().filter(|_| in_pages) {
+        let of_pages = regions.as_mut().map(|regions| std::mem::take(&mut regions.of_blocks));
+        for page in 0..pages {
+            let section = next(b"IPAG");
+            assert!(
+                *end_of_head.get_or_insert(section.range[0]) == section.range[0]
+                    || section.range[0] == end_of_pages
+            );
+            end_of_pages = section.range[1];
+            let lists = wire::index_page(section, page as u32, index, &info, regions.is_some());
+            if let (Some(regions), Some(of_pages)) = (&mut regions, &of_pages) {
+                let all: BTreeSet<u16> = lists.iter().flatten().copied().collect();
+                assert_eq!(of_pages[page], Vec::from_iter(all));
+                regions.of_blocks.extend(lists);
+            }
+        }
     }
     let mut parts_of = Parts::new();
     let mut blocks: Vec<Range<usize>> = Vec::new();
@@ -149,7 +171,8 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         parts_of.push(parts);
     }
     if let (Some(index), Some(section), Some(first)) = (&index, section, blocks.first()) {
-        assert_eq!(section.range[1] + index.between, first.start as u64);
+        assert_eq!(section.range[1] + index.between, end_of_head.unwrap_or(first.start as u64));
+        assert!(!in_pages || end_of_pages == first.start as u64);
     }
     assert!(known.next().is_none());
     let values = front.iter().filter(|section| &section.kind == b"fldx");

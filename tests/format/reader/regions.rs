@@ -19,13 +19,13 @@ pub struct Regions {
     pub all: Vec<Region>,
     pub deviation: f64,
     pub of_base: Vec<u16>,
-    /// Of each block, ascending.
+    /// Of each block, ascending; of a file whose index is in pages at first those of the pages.
     pub of_blocks: Vec<Vec<u16>>,
     /// By field whether it jumps; with flag 1 of the header.
     pub jumps: Vec<bool>,
 }
 
-/// The regions of a file with so many blocks; none if it has none.
+/// The regions of a file with so many blocks, or pages of the index; none if it has none.
 pub fn find(front: &[Section<'_>], info: &Info, blocks: usize, has_sides: bool) -> Option<Regions> {
     let place = |kind: &[u8; 4]| front.iter().position(|section| &section.kind == kind);
     let at = place(b"regn")?;
@@ -43,16 +43,8 @@ pub fn find(front: &[Section<'_>], info: &Info, blocks: usize, has_sides: bool) 
         assert!(region < count);
         of_base.extend((0..length).map(|_| region as u16));
     }
-    let of_block = |bytes: &mut Bytes<'_>| {
-        let mut regions: Vec<u16> = Vec::new();
-        for _ in 0..bytes.varint() {
-            let next = regions.last().map_or(0, |last| u32::from(*last) + 1);
-            regions.push((next + bytes.varint()) as u16);
-        }
-        assert!(regions.last().is_none_or(|last| u32::from(*last) < count));
-        regions
-    };
-    let of_blocks = (0..blocks).map(|_| of_block(&mut bytes)).collect();
+    let of_blocks: Vec<Vec<u16>> = (0..blocks).map(|_| bytes.ascending()).collect();
+    assert!(of_blocks.iter().flatten().all(|&region| u32::from(region) < count));
     let jump = |bytes: &mut Bytes<'_>| match bytes.u8() {
         0 => false,
         1 => true,

@@ -61,6 +61,16 @@ impl<'a> Bytes<'a> {
         String::from_utf8(self.take(length as usize).to_vec()).expect("UTF-8")
     }
 
+    /// How many numbers, then these: the first, then each less the one before less 1.
+    pub fn ascending(&mut self) -> Vec<u16> {
+        let mut numbers: Vec<u16> = Vec::new();
+        for _ in 0..self.varint() {
+            let next = numbers.last().map_or(0, |last| u32::from(*last) + 1);
+            numbers.push(u16::try_from(next + self.varint()).expect("16 bits"));
+        }
+        numbers
+    }
+
     pub fn end(self) {
         assert!(self.0.is_empty(), "something is left over");
     }
@@ -92,7 +102,7 @@ pub fn sections(file: &[u8]) -> Vec<Section<'_>> {
     assert_eq!(header.take(8), [0x89, 0x54, 0x4C, 0x4F, 0x44, 0x0D, 0x0A, 0x1A]);
     assert_eq!(header.u16(), 2, "the version");
     let _reserved = header.u16();
-    assert!(header.u32() & 0xFFFF <= 3, "critical flags");
+    assert!(header.u32() & 0xFFFF <= 7, "critical flags");
     let total = header.u64();
     assert!(total == 0 || total == file.len() as u64);
     let _reserved = header.u32();
@@ -285,22 +295,81 @@ pub struct BlockEntry {
 pub struct Index {
     pub block_bits: u32,
     pub between: u64,
+    pub count: u32,
+    /// With flag 2 of the header they come later.
     pub blocks: Vec<BlockEntry>,
+    pub pages: Option<IndexPages>,
 }
 
-pub fn index(mut bytes: Bytes<'_>, info: &Info) -> Index {
+/// Pages of the index.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IndexPages {
+    pub bits: u32,
+    /// The bytes of the section, those of the blocks, and what is told of them, without lengths.
+    pub all: Vec<(u32, u64, BlockEntry)>,
+}
+
+pub fn index(mut bytes: Bytes<'_>, info: &Info, in_pages: bool) -> Index {
     let block_bits = u32::from(bytes.u8());
     assert!((4..=16).contains(&block_bits));
     let between = bytes.varint64();
     let count = bytes.varint();
     assert_eq!(count, info.updates.div_ceil(1 << block_bits));
-    let blocks = (0..count).map(|_| block_entry(&mut bytes, info)).collect();
+    let mut index = Index { block_bits, between, count, blocks: Vec::new(), pages: None };
+    if in_pages {
+        let bits = u32::from(bytes.u8());
+        assert!(bits <= 20);
+        let page = |_| (bytes.varint(), bytes.varint64(), entry(&mut bytes, info, Vec::new()));
+        index.pages = Some(IndexPages { bits, all: (0..count.div_ceil(1 << bits)).map(page).collect() });
+    } else {
+        index.blocks = (0..count).map(|_| block_entry(&mut bytes, info)).collect();
+    }
     bytes.end();
-    Index { block_bits, between, blocks }
+    index
+}
+
+/// The entries of the next page, which is number `page`; with regions of each, if the file tells of such.
+pub fn index_page(
+    section: &Section<'_>,
+    page: u32,
+    index: &mut Index,
+    info: &Info,
+    has_regions: bool,
+) -> Vec<Vec<u16>> {
+    let pages = index.pages.as_ref().expect("pages");
+    let (length, sum, all) = &pages.all[page as usize];
+    assert_eq!(section.range[1] - section.range[0], u64::from(*length));
+    let mut bytes = section.payload;
+    assert_eq!(bytes.varint(), page);
+    let count = (index.count - (page << pages.bits)).min(1 << pages.bits);
+    let blocks: Vec<BlockEntry> = (0..count).map(|_| block_entry(&mut bytes, info)).collect();
+    let regions = (0..if has_regions { count } else { 0 }).map(|_| bytes.ascending()).collect();
+    bytes.end();
+    assert_eq!(
+        blocks.iter().flat_map(|block| &block.lengths).map(|&length| u64::from(length)).sum::<u64>(),
+        *sum
+    );
+    let union = |spans: &mut dyn Iterator<Item = [u64; 2]>| {
+        spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).expect("a block")
+    };
+    for axis in 0..3 {
+        assert_eq!(union(&mut blocks.iter().map(|block| block.bounds[axis])), all.bounds[axis]);
+    }
+    for field in 0..info.fields.len() {
+        let error = blocks.iter().map(|block| block.fields[field].0).max().expect("a block");
+        let range = union(&mut blocks.iter().map(|block| block.fields[field].1));
+        assert_eq!((error, range), all.fields[field]);
+    }
+    index.blocks.extend(blocks);
+    regions
 }
 
 fn block_entry(bytes: &mut Bytes<'_>, info: &Info) -> BlockEntry {
     let lengths = (0..=info.fields.len()).map(|_| bytes.varint()).collect();
+    entry(bytes, info, lengths)
+}
+
+fn entry(bytes: &mut Bytes<'_>, info: &Info, lengths: Vec<u32>) -> BlockEntry {
     let span = |bytes: &mut Bytes<'_>, bits: u32| {
         let (low, more) = (u64::from(bytes.varint()), u64::from(bytes.varint()));
         assert!(low + more <= 1 << bits.min(8));

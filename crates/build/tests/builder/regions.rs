@@ -146,12 +146,12 @@ fn files_keep_regions_and_say_which_a_block_reaches() {
         parents[u].iter().for_each(|&parent| reached[parent as usize].extend(&own));
     }
     let index = decoder.index().expect("a file with blocks");
-    for (page, block) in (0..).zip(&index.blocks) {
+    for (page, block) in index.known() {
         let all: BTreeSet<u16> =
             mt.page_updates(page).flat_map(|u| reached[u as usize].iter().copied()).collect();
         assert_eq!(block.regions, Vec::from_iter(all), "block {page}");
     }
-    assert!(index.blocks.iter().any(|block| block.regions.len() == 1), "blocks tell regions apart");
+    assert!(index.known().any(|(_, block)| block.regions.len() == 1), "blocks tell regions apart");
 }
 
 /// Whether some tetrahedron that an applied update removed was in a region and had a larger error; none if a child is in the way.
