@@ -60,7 +60,7 @@ pub(super) fn read_unsettled(files: &FilesOf<'_>, options: &ReadOptions) -> Resu
 /// Reads what is wanted of a file of a format that need not be read as a whole; none if it is another one.
 #[cfg(feature = "hdf5")]
 fn read_ranges(files: &FilesOf<'_>, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
-    formats::hdf5::read_given(files, options)
+    formats::hdf5_files::read_given(files, options)
 }
 
 #[cfg(not(feature = "hdf5"))]

@@ -11,8 +11,7 @@ use hdf5_reader::{BlockCacheStorage, BytesStorage, FileStorage, Hdf5File, OpenOp
 use netcdf_reader::{NcFile, NcOpenOptions};
 
 use crate::beside::{FilesOf, Source};
-use crate::error::{At, ReadError, ReadReason, in_file};
-use crate::formats::exodus_pieces::Decomposition;
+use crate::error::{At, ReadError, ReadReason};
 use crate::formats::hdf5_values::{netcdf_reason, reason};
 use crate::formats::{exodus, vtkhdf};
 use crate::{MemoryLimit, ReadOptions, foreign};
@@ -57,7 +56,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
 }
 
 /// The given file if it is one of these.
-fn open(files: &FilesOf<'_>) -> Option<DynStorage> {
+pub(super) fn open(files: &FilesOf<'_>) -> Option<DynStorage> {
     if !is_known(&files.head(HDF5.len())) {
         return None;
     }
@@ -94,30 +93,12 @@ pub(super) fn exodus_in(storage: DynStorage, options: &ReadOptions) -> Result<Nc
     }
 }
 
-/// Reads the given file if it is one of these; others are for other readers, and so is one that cannot be opened.
-pub(crate) fn read_given(files: &FilesOf<'_>, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
-    let result = match Decomposition::of(files) {
-        Ok(None) => read_from(open(files)?, options),
-        Ok(Some(pieces)) => {
-            pieces.names().for_each(|file| files.note(file));
-            pieces.read(options)
-        }
-        Err(error) => Err(error),
-    };
-    Some(result.map_err(|error| in_file(error, &files.name())))
-}
-
-/// The times of the steps in the given file; none if it is not one of these, or has no steps.
-pub(crate) fn times(files: &FilesOf<'_>) -> Result<Vec<f64>, ReadError> {
-    if let Some(pieces) = Decomposition::of(files)? {
-        return pieces.times();
-    }
-    let Some(storage) = open(files) else { return Ok(Vec::new()) };
-    let times = content(storage, u64::MAX).and_then(|content| match content {
+/// The times of the steps of a file; none if it has no steps.
+pub(super) fn times_in(storage: DynStorage) -> Result<Vec<f64>, ReadError> {
+    match content(storage, u64::MAX)? {
         Content::Vtkhdf(file) => vtkhdf::times(&file),
         Content::Exodus(file) => exodus::times(&file),
-    });
-    times.map_err(|error| in_file(error, &files.name()))
+    }
 }
 
 /// Opens the file at a path if it is VTKHDF.
@@ -129,7 +110,8 @@ pub(super) fn open_vtkhdf(path: &Path, options: &ReadOptions) -> Result<Option<H
     })
 }
 
-fn read_from(storage: DynStorage, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+/// Reads a mesh or grid.
+pub(super) fn read_from(storage: DynStorage, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     match content(storage, options.memory.most())? {
         Content::Vtkhdf(file) => vtkhdf::read(&file, options),
         Content::Exodus(file) => exodus::read(&file, options),

@@ -16,7 +16,9 @@ mod gmsh_mesh;
 mod gmsh_sections;
 mod gmsh_views;
 #[cfg(feature = "hdf5")]
-pub(super) mod hdf5;
+mod hdf5;
+#[cfg(feature = "hdf5")]
+pub(super) mod hdf5_files;
 #[cfg(feature = "hdf5")]
 mod hdf5_values;
 mod medit;
@@ -127,7 +129,7 @@ pub(super) fn times(files: &FilesOf<'_>) -> Result<Vec<f64>, ReadError> {
     }
     #[cfg(feature = "hdf5")]
     {
-        let times = hdf5::times(files)?;
+        let times = hdf5_files::times(files)?;
         if !times.is_empty() {
             return Ok(times);
         }
