@@ -72,11 +72,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     files::check_ending(output, "mt")?;
     files::check_output(output, &options.inputs)?;
     let level = options.repair.level();
-    let may_part = arguments.parts.is_some() || arguments.memory.is_some();
     if let Some(built) = build_pieces(arguments, &config, output)? {
         return finish(arguments, &config, (built, start), Report::default());
     }
-    let (mut mesh, mut repaired) = options.read(&config, level, arguments.memory, may_part)?;
+    let (mut mesh, mut repaired) = options.read(&config, level, arguments.memory)?;
     // Inputs may name others.
     files::check_output(output, &[])?;
     let [points, tetrahedra] = mesh.counts();

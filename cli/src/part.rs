@@ -136,7 +136,7 @@ fn part(arguments: &Arguments, forget: &dyn Fn() -> Result<()>) -> Result<()> {
     let plan = if let Some(plan) = by_pieces.with_context(|| options.name())? {
         plan
     } else {
-        let (mesh, repaired) = options.read(&config, options.repair.level(), None, true)?;
+        let (mesh, repaired) = options.read(&config, options.repair.level(), None)?;
         options.repair_of(&mesh, &repaired, Way::Parts(*parts), verbosity)?;
         let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata.clone());
         fill(&part).with_context(|| options.name())?

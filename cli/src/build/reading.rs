@@ -39,21 +39,19 @@ impl BuildOptions {
 
     /// Reads what is wanted of the input, in so much memory at most.
     ///
-    /// If it may be built in parts, a regular grid comes without points and tetrahedra where only its values are needed.
+    /// A regular grid comes without points and tetrahedra where only its values are needed: what building takes is known before these are made.
     pub fn read(
         &self,
         config: &BuildConfig,
         level: RepairLevel,
         memory: Option<u64>,
-        in_parts: bool,
     ) -> Result<(TetMesh, RepairReport)> {
         let with_labels = !config.preserve.is_empty();
         let cells = if self.cell_to_point || with_labels { CellData::Values } else { CellData::Names };
         let wanted =
             FieldSelection { names: &config.fields, all: config.all_fields, labels: &config.preserve, cells };
         let needs_points = |name: &String| GeometryField::named(name).is_some();
-        let alone = in_parts
-            && cells == CellData::Names
+        let alone = cells == CellData::Names
             && config.min_dihedral.is_none()
             && !config.fields.iter().any(needs_points);
         input::expect_format(&self.inputs, self.format.as_deref());
