@@ -39,10 +39,13 @@ pub fn memory_needed_in_pieces(
     let piece = largest.saturating_mul(each);
     let part = (tetrahedra / u64::from(parts.max(1))).saturating_mul(each);
     // The tetrahedra around each such point, what they have at their corners, and which are beside each other, while points are located in them.
-    let near = meeting.saturating_mul(1100 + 100 * fields).saturating_add(points.saturating_mul(8));
+    let near = meeting.saturating_mul(1102 + 100 * fields).saturating_add(points.saturating_mul(8));
     let parting = piece.max(part).saturating_add(near);
     parting.max(after_parting(counts, parts, at_a_time))
 }
+
+/// What sorting takes that goes through files.
+const SORTED: u64 = 16 << 20;
 
 /// What the steps after parting take.
 fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
@@ -53,13 +56,13 @@ fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: 
     // What is left of the children is an eighth of their tetrahedra, with all of their points. But more stay where parts meet: at both sides of
     // planes across a grid, two triangles for each square.
     let side = libm::cbrt(points as f64);
-    let joining = |planes: f64| {
+    let left = |planes: f64| {
         let at_interfaces = (4.0 * planes * side * side) as u64;
-        let left = at_interfaces.saturating_mul(LEFT_AT_INTERFACE as u64).max(tetrahedra / 8).min(tetrahedra);
-        left.saturating_mul(45).saturating_add(of_points(100 + 24 * fields))
+        at_interfaces.saturating_mul(LEFT_AT_INTERFACE as u64).max(tetrahedra / 8).min(tetrahedra)
     };
+    let joining = |planes: f64| left(planes).saturating_mul(45).saturating_add(of_points(100 + 24 * fields));
     let last = joining(6.0);
-    let assembling = of_points(250 + 30 * fields);
+    let assembling = left(6.0).saturating_mul(60).saturating_add(of_points(24 + 6 * fields)) + SORTED;
     // Of what has been freed, allocators keep some for each thread. One step alone is done by the thread that assembles.
     let joins = parts.div_ceil(8);
     let first = joining(3.0 * (libm::cbrt(parts.into()) - 1.0));

@@ -2,8 +2,8 @@
 //!
 //! The domain is parted in space ([`part`]). Each part is built on its own ([`build_part`]): vertices that it shares with others stay,
 //! so what is left of it still fits them. Eight parts at a time are joined ([`join`]): what was between them is simplified then, and
-//! what is left joins the next seven, as in an octree. In the end one MT is made of all updates, which does not know of the parts: in
-//! memory ([`assemble`]), or block by block ([`assemble_blocks`]). (Danovaro, De Floriani, Magillo, Puppo 2003 name this as future work [§7].)
+//! what is left joins the next seven, as in an octree. In the end one MT is made of all updates (`assemble`), which does not know
+//! of the parts. (Danovaro, De Floriani, Magillo, Puppo 2003 name this as future work [§7].)
 //!
 //! Each step reads and writes plain bytes, its result depends on nothing else, and takes memory for what is left of a part. The error
 //! of each update is measured at all reference vertices that it covers, exactly as in a whole: they travel with what is left.
@@ -91,7 +91,10 @@ mod prepared;
 mod scratch;
 mod wire;
 
-pub use assemble::{Assembled, assemble, assemble_blocks};
+pub use assemble::assemble;
+#[doc(hidden)]
+pub use assemble::{Assembled, assemble_blocks};
+#[doc(hidden)]
 pub use grid::{GridValues, PointBox, part_grid};
 pub(super) use node::LEFT_AT_INTERFACE;
 pub use node::{build_part, join};
