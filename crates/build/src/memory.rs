@@ -44,7 +44,7 @@ pub fn memory_needed_in_pieces(
     parting.max(after_parting(counts, parts, at_a_time))
 }
 
-/// What sorting takes that goes through files.
+/// The most that sorting takes that goes through files.
 const SORTED: u64 = 16 << 20;
 
 /// What the steps after parting take.
@@ -62,7 +62,8 @@ fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: 
     };
     let joining = |planes: f64| left(planes).saturating_mul(45).saturating_add(of_points(100 + 24 * fields));
     let last = joining(6.0);
-    let assembling = left(6.0).saturating_mul(60).saturating_add(of_points(24 + 6 * fields)) + SORTED;
+    let assembling = left(6.0).saturating_mul(60).saturating_add(of_points(24 + 6 * fields));
+    let assembling = assembling.saturating_add(of_points(20).min(SORTED));
     // Of what has been freed, allocators keep some for each thread. One step alone is done by the thread that assembles.
     let joins = parts.div_ceil(8);
     let first = joining(3.0 * (libm::cbrt(parts.into()) - 1.0));
