@@ -554,7 +554,7 @@ test("a mesh that was kept is shown beside the current one, or the difference of
 test("the eye flies, and rotations run out unless less motion is asked for", async () => {
   const page = await openSmall();
   const camera = () => page.evaluate(() => window.tetralodDemo.viewer.state.camera);
-  // The moves come 8 ms apart, and the pointer is let go of right behind the last one, however busy the machine is.
+  // The moves come 8 ms apart, and the pointer is let go of right behind the last one: so their times say, however busy the machine is.
   const swing = async () => {
     const canvas = await page.locator("#canvas").boundingBox();
     await page.mouse.move(canvas.x + 50, canvas.y + 60);
@@ -562,14 +562,14 @@ test("the eye flies, and rotations run out unless less motion is asked for", asy
     await page.waitForSelector("#canvas.turning");
     await page.evaluate(
       ([left, top]) => {
-        const at = (name, x) => {
-          const start = performance.now();
-          while (performance.now() - start < 8);
-          const place = { clientX: left + x, clientY: top + 60, pointerId: 1, buttons: 1 };
-          document.querySelector("#canvas").dispatchEvent(new PointerEvent(name, place));
+        const start = performance.now();
+        const at = (name, x, i) => {
+          const event = new PointerEvent(name, { clientX: left + x, clientY: top + 60, pointerId: 1, buttons: 1 });
+          Object.defineProperty(event, "timeStamp", { value: start + 8 * i });
+          document.querySelector("#canvas").dispatchEvent(event);
         };
-        for (let i = 1; i < 8; i++) at("pointermove", 50 + 12 * i);
-        at("pointerup", 50 + 12 * 7);
+        for (let i = 1; i < 8; i++) at("pointermove", 50 + 12 * i, i);
+        at("pointerup", 50 + 12 * 7, 8);
       },
       [canvas.x, canvas.y],
     );

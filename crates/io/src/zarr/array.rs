@@ -108,7 +108,8 @@ impl Samples {
 
     /// All values of an array of one axis.
     pub fn list(&self) -> Result<Vec<f64>, ReadError> {
-        self.ordered(&[0..self.shape()[0]], &[0])
+        let all = 0..self.shape()[0];
+        self.ordered(std::slice::from_ref(&all), &[0])
     }
 
     /// The values in a box, x fastest, of one time and channel.

@@ -38,6 +38,9 @@ impl fmt::Debug for Server {
     }
 }
 
+/// Bytes of an object, and how many it has in all if the server says so.
+type Fetched = (Vec<u8>, Option<u64>);
+
 impl Server {
     /// What is below `http://…`, `https://…` or `s3://bucket/…`.
     pub fn of(address: &str) -> Result<Self, ReadReason> {
@@ -88,7 +91,7 @@ impl Server {
     }
 
     /// A range of an object and the size of the whole, as far as the server says it; none if there is no such object.
-    fn fetch(&self, key: &str, range: Range<u64>) -> Result<Option<(Vec<u8>, Option<u64>)>, ReadReason> {
+    fn fetch(&self, key: &str, range: Range<u64>) -> Result<Option<Fetched>, ReadReason> {
         let address = match &self.root {
             Root::Address([before, behind]) => format!("{before}/{key}{behind}"),
             Root::Bucket(bucket, credentials, prefix) => {

@@ -30,7 +30,7 @@ pub(super) struct Store {
 enum Place {
     Folder(PathBuf),
     #[cfg(feature = "http")]
-    Server(Server),
+    Server(Box<Server>),
 }
 
 /// Whether a path is an address on a server.
@@ -50,7 +50,7 @@ impl Store {
     pub fn of(path: &Path, memory: &MemoryLimit) -> Result<Self, ReadReason> {
         #[cfg(feature = "http")]
         if is_address(path) {
-            let place = Place::Server(Server::of(&path.to_string_lossy())?);
+            let place = Place::Server(Box::new(Server::of(&path.to_string_lossy())?));
             return Ok(Self { place, memory: memory.clone() });
         }
         Ok(Self { place: Place::Folder(path.to_owned()), memory: memory.clone() })

@@ -66,6 +66,9 @@ struct Found {
     attributes: Map<String, Value>,
 }
 
+/// Reads what an array has at a step, in a channel.
+type ReadValues<'a> = &'a dyn Fn(&OnGrid, u64, &str) -> Result<Vec<f64>, ReadError>;
+
 impl Volume {
     /// Opens what is at a path or an address.
     pub fn open(given: &Path, memory: &MemoryLimit) -> Result<Self, ReadError> {
@@ -117,7 +120,7 @@ impl Volume {
     fn collect(
         &self,
         options: &ReadOptions,
-        read: &dyn Fn(&OnGrid, u64, &str) -> Result<Vec<f64>, ReadError>,
+        read: ReadValues<'_>,
     ) -> Result<(GridValues, Vec<(usize, u64)>), ReadError> {
         let time = self.step(options).at(String::new)?;
         let mut fields = Collector::new(options);
