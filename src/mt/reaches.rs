@@ -324,10 +324,10 @@ mod tests {
         reaches.end_node();
         // The last number comes before others.
         push(&mut reaches, 3);
-        reaches.close_node(&[3..4]);
+        reaches.close_node(std::slice::from_ref(&(3..4)));
         assert!(reaches.ranges[3].is_empty() && !reaches.ranges[1].is_empty());
         push(&mut reaches, 2);
-        reaches.close_node(&[2..3]);
+        reaches.close_node(std::slice::from_ref(&(2..3)));
         let expected =
             [extent(0, 31, [0, 8]), extent(10, 31, [1, 8]), extent(20, 21, [2, 7]), extent(30, 31, [3, 8])];
         assert_eq!(reaches.finish(), expected);

@@ -147,7 +147,7 @@ mod tests {
     fn children_come_back_by_vertices() {
         let vertices = 3_u32 << BUCKET_BITS;
         // Some vertices have none, one has many.
-        let vertex = |u: u32| if u % 5 == 0 { 70_000 } else { u * 7919 % vertices };
+        let vertex = |u: u32| if u.is_multiple_of(5) { 70_000 } else { u * 7919 % vertices };
         let offset = |u: u32| [u as i32, -(u as i32), 3];
         let scratch = InMemory::default();
         let mut sorter = ChildSorter::new(&scratch, vertices);
