@@ -51,6 +51,9 @@ fn part(bytes: &[u8], range: std::ops::Range<u64>) -> &[u8] {
     &bytes[range.start as usize..range.end as usize]
 }
 
+/// The kind and the payload of each section of a file.
+type Sections = Vec<([u8; 4], Vec<u8>)>;
+
 #[test]
 fn a_second_reader_finds_in_pages_what_is_in_one_section() {
     for fields in [1, 3] {
@@ -159,7 +162,7 @@ fn pages_with_good_checksums_are_not_trusted() {
     let good = sections(&in_index_pages(&sample()));
     let places: Vec<usize> = (0..good.len()).filter(|&at| &good[at].0 == b"IPAG").collect();
     assert!(decode(&assemble(&good, 300)).is_ok());
-    let is_corrupt = |change: &dyn Fn(&mut Vec<([u8; 4], Vec<u8>)>)| {
+    let is_corrupt = |change: &dyn Fn(&mut Sections)| {
         let mut changed = good.clone();
         change(&mut changed);
         matches!(decode(&assemble(&changed, 300)), Err(FormatError::Corrupt { .. }))
