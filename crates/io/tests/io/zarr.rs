@@ -163,6 +163,15 @@ fn all_ways() -> Vec<(String, Value)> {
     of_3.chain(of_2).collect()
 }
 
+/// The bytes of a number in some type.
+type ToBytes<'a> = &'a dyn Fn(u16) -> Vec<u8>;
+
+/// Takes a part.
+type PutPart<'a> = &'a mut dyn FnMut(Part) -> Result<(), PartsError>;
+
+/// Parts a volume.
+type Parting<'a> = &'a dyn Fn(PutPart<'_>) -> Result<Plan, PartsError>;
+
 #[test]
 fn all_versions_codecs_orders_and_shards_give_the_same_mesh() {
     let folder = Folder::new();
@@ -180,7 +189,7 @@ fn all_versions_codecs_orders_and_shards_give_the_same_mesh() {
 #[test]
 fn all_types_of_numbers_are_read() {
     let folder = Folder::new();
-    let types: [(&str, &dyn Fn(u16) -> Vec<u8>); 14] = [
+    let types: [(&str, ToBytes<'_>); 14] = [
         ("bool", &|v| vec![(v % 2) as u8]),
         ("int8", &|v| vec![(v % 2) as u8]),
         ("uint8", &|v| vec![(v % 2) as u8]),
@@ -559,17 +568,16 @@ fn boxes_are_read_without_the_chunks_beside_them() {
 
 /// The parts of a volume, as bytes: of all values, and of values that are read for each part.
 fn parts_of(path: &Path, config: &BuildConfig, count: u32) -> [Result<Vec<Vec<u8>>, String>; 2] {
-    let collect =
-        |part: &dyn Fn(&mut dyn FnMut(Part) -> Result<(), PartsError>) -> Result<Plan, PartsError>| {
-            let mut all = Vec::new();
-            let plan = part(&mut |part| {
-                let mut bytes = Vec::new();
-                part.write(&mut bytes)?;
-                all.push(bytes);
-                Ok(())
-            });
-            plan.map(|_| all).map_err(|error| error.to_string())
-        };
+    let collect = |part: Parting<'_>| {
+        let mut all = Vec::new();
+        let plan = part(&mut |part| {
+            let mut bytes = Vec::new();
+            part.write(&mut bytes)?;
+            all.push(bytes);
+            Ok(())
+        });
+        plan.map(|_| all).map_err(|error| error.to_string())
+    };
     let mut mesh = io::read_unexpanded(path, &ReadOptions::default()).expect("a mesh");
     mark_labels(&mut mesh, &[], config).expect("labels");
     let pieces =
