@@ -61,6 +61,7 @@ const ELSEWHERE = {
   "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
   "docs/howto/one-file.md": ["sh: cli/tests/command/html.rs and html-browser.test.js make such pages; the command here is without the viewer"],
   "docs/howto/python.md": ["python: python/tests/test_pages.py"],
+  "docs/input.md": ["sh: cli/tests/command/parts.rs builds decompositions"],
 };
 
 /** Pages that open without a volume: their test is below. */
