@@ -3,7 +3,7 @@
 
 use crate::reader;
 use crate::support::files::{
-    bytes_in_blocks, crc32, decode, half_edge, header, in_blocks, inserted, options, section, sections,
+    assemble_flagged, bytes_in_blocks, decode, half_edge, in_blocks, inserted, options, sections,
 };
 use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, FormatError, Index, encode};
 use tetralod::mt::{Mt, MtKind, UpdatePages};
@@ -26,13 +26,7 @@ fn sample() -> Mt {
 
 /// A file with these sections and flag 2.
 fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
-    let framed: Vec<Vec<u8>> = sections.iter().map(|(kind, payload)| section(kind, payload)).collect();
-    let crcs: Vec<u8> = framed.iter().flat_map(|s| s[8..12].to_vec()).collect();
-    let mut end = updates.to_le_bytes().to_vec();
-    end.extend((framed.len() as u32).to_le_bytes());
-    end.extend(crc32(&[&crcs]).to_le_bytes());
-    let body = [framed.concat(), section(b"ENDF", &end)].concat();
-    [header(2, 4, 32 + body.len() as u64), body].concat()
+    assemble_flagged(4, sections, updates)
 }
 
 /// A decoder that has what comes in front of the pages.

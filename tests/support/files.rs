@@ -353,11 +353,16 @@ pub fn sections(bytes: &[u8]) -> Vec<([u8; 4], Vec<u8>)> {
 
 /// A well-framed file of the given sections, with a header and totals that fit.
 pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
+    assemble_flagged(0, sections, updates)
+}
+
+/// [`assemble`] with these flags in the header.
+pub fn assemble_flagged(flags: u32, sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
     let framed: Vec<Vec<u8>> = sections.iter().map(|(kind, payload)| section(kind, payload)).collect();
     let crcs: Vec<u8> = framed.iter().flat_map(|s| s[8..12].to_vec()).collect();
     let mut end = updates.to_le_bytes().to_vec();
     end.extend((framed.len() as u32).to_le_bytes());
     end.extend(crc32(&[&crcs]).to_le_bytes());
     let body = [framed.concat(), section(b"ENDF", &end)].concat();
-    [header(2, 0, 32 + body.len() as u64), body].concat()
+    [header(2, flags, 32 + body.len() as u64), body].concat()
 }
