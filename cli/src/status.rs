@@ -101,17 +101,10 @@ struct Finished {
     done: Done,
 }
 
-/// How far a task is.
-enum State {
-    Done,
-    Failed,
-    Open,
-}
-
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let mut tasks = Tasks::of(&arguments.folder)?;
+    let (mut tasks, mut done) = (Tasks::of(&arguments.folder)?, BTreeSet::new());
     if !arguments.watch {
-        let status = Status::of(arguments, &tasks)?;
+        let status = Status::of(arguments, &tasks, &mut done)?;
         return output::result(arguments.json, &status, &status.rows());
     }
     let is_bar = !arguments.json && io::stdout().is_terminal();
@@ -120,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut shown = None;
     loop {
         let start = Instant::now();
-        let status = Status::of(arguments, &tasks)?;
+        let status = Status::of(arguments, &tasks, &mut done)?;
         let (is_last, key) = (!status.goes_on, status.key());
         if is_bar && !is_last {
             bar.set_message(output::printable(&output::lines(&status.rows())).into_owned());
@@ -137,7 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             return Ok(());
         }
         if !tasks.are_planned() {
-            tasks = Tasks::of(&arguments.folder)?;
+            (tasks, done) = (Tasks::of(&arguments.folder)?, BTreeSet::new());
         }
         // Looking takes a tenth of the time at most.
         std::thread::sleep(LOOK.max(10 * start.elapsed()));
@@ -145,13 +138,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 impl Status {
-    fn of(arguments: &Arguments, tasks: &Tasks) -> Result<Self> {
-        let files = tasks.files()?;
-        let last = tasks.last();
-        let file = tasks.result(last);
+    /// `done` is what was done when it was looked at before.
+    fn of(arguments: &Arguments, tasks: &Tasks, done: &mut BTreeSet<Node>) -> Result<Self> {
+        let (files, last) = (tasks.files()?, tasks.last());
+        tasks.look(&files, done)?;
+        let has_file = tasks.are_planned() && done.contains(&last);
         let mut status = Self {
             folder: arguments.folder.display().to_string(),
-            file: (tasks.are_planned() && files.has_result(&file)).then(|| file.display().to_string()),
+            file: has_file.then(|| tasks.result(last).display().to_string()),
             goes_on: false,
             pieces: tasks.pieces()?,
             levels: tasks.levels().iter().map(|&tasks| Level { tasks, ..Level::default() }).collect(),
@@ -161,15 +155,15 @@ impl Status {
             tasks_per_minute: None,
             seconds_left: None,
         };
-        let (mut done, mut failed) = (BTreeSet::new(), BTreeSet::new());
+        let mut failed = BTreeSet::new();
         for task in tasks.all() {
-            match status.add(tasks, task, &files) {
-                State::Done => _ = done.insert(task),
-                State::Failed => _ = failed.insert(task),
-                State::Open => (),
+            if done.contains(&task) {
+                status.add_done(tasks, task);
+            } else if status.add_open(tasks, task, &files) {
+                failed.insert(task);
             }
         }
-        let has_ready = || !tasks.open(&done, |task| failed.contains(&task)).ready.is_empty();
+        let has_ready = || !tasks.open(done, |task| failed.contains(&task)).ready.is_empty();
         // With the plan come other tasks.
         let is_parted_just_now = !tasks.are_planned() && done.contains(&last);
         status.goes_on = is_parted_just_now || status.file.is_none() && has_ready();
@@ -190,23 +184,25 @@ impl Status {
         Ok(status)
     }
 
-    /// Counts a task.
-    fn add(&mut self, tasks: &Tasks, task: Node, files: &Files) -> State {
+    /// Counts a task that is done.
+    fn add_done(&mut self, tasks: &Tasks, task: Node) {
+        let (name, level) = (tasks.name(task), task.level);
+        self.levels[level as usize].done += 1;
+        self.finished.extend(tasks.done(task).map(|done| Finished { task: name, level, done }));
+    }
+
+    /// Counts one that is not; returns true if it has failed too often.
+    fn add_open(&mut self, tasks: &Tasks, task: Node, files: &Files) -> bool {
         let (name, level) = (tasks.name(task), task.level);
         let counts = &mut self.levels[level as usize];
-        if files.has_result(&tasks.result(task)) {
-            counts.done += 1;
-            self.finished.extend(tasks.done(task).map(|done| Finished { task: name, level, done }));
-            return State::Done;
-        }
         let (times, holder) = (tasks.tries(task, files), lease::last_of(tasks, task, files));
         let last = tasks.failure(task, times);
         let is_final = last.as_ref().is_some_and(|last| times >= last.tries);
         let is_stale = |(holder, silent): &(Holder, f64)| *silent > holder.stale_after;
-        let (state, count) = match &holder {
-            Some(lease) if !is_stale(lease) => (State::Open, &mut counts.running),
-            _ if is_final => (State::Failed, &mut counts.failed),
-            _ => (State::Open, &mut counts.waiting),
+        let (has_failed, count) = match &holder {
+            Some(lease) if !is_stale(lease) => (false, &mut counts.running),
+            _ if is_final => (true, &mut counts.failed),
+            _ => (false, &mut counts.waiting),
         };
         *count += 1;
         self.failed.extend(last.map(|last| FailedTask { task: name.clone(), times, is_final, last }));
@@ -218,7 +214,7 @@ impl Status {
             is_stale: is_stale(&lease),
             holder: lease.0,
         }));
-        state
+        has_failed
     }
 
     /// Says how long the rest will take by what finished tasks of the same kinds have taken.

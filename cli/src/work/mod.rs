@@ -156,7 +156,8 @@ impl Worker<'_> {
         let mut pause = SHORT;
         loop {
             let files = self.tasks.files()?;
-            self.look(&files)?;
+            self.tasks.look(&files, &mut self.done)?;
+            self.bar.set_position(self.done.len() as u64);
             if self.done.contains(&self.tasks.last()) {
                 if self.tasks.are_planned() {
                     return Ok(());
@@ -186,21 +187,6 @@ impl Worker<'_> {
                 pause = (2 * pause).min(self.leases.beat()).min(PATIENCE);
             }
         }
-    }
-
-    /// Notes what has been done.
-    fn look(&mut self, files: &Files) -> Result<()> {
-        for task in self.tasks.all() {
-            let is_known = self.done.contains(&task);
-            if !files.has_result(&self.tasks.result(task)) {
-                // It may have been lost.
-                self.done.remove(&task);
-            } else if !is_known && self.tasks.is_done(task)? {
-                self.done.insert(task);
-            }
-        }
-        self.bar.set_position(self.done.len() as u64);
-        Ok(())
     }
 
     /// Takes a task that others wait for, if there is one that nobody is at.

@@ -201,6 +201,23 @@ impl Tasks {
         Ok(Files { parts: names(&self.folder)?, notes: names(&self.folder.join(NOTES))? })
     }
 
+    /// Notes which tasks are done, of those whose results may be among these files. What is noted as done is not read again.
+    ///
+    /// # Errors
+    /// As [`Self::is_done`].
+    pub fn look(&self, files: &Files, done: &mut BTreeSet<Node>) -> Result<()> {
+        for task in self.all() {
+            let is_known = done.contains(&task);
+            if !files.has_result(&self.result(task)) {
+                // It may have been lost.
+                done.remove(&task);
+            } else if !is_known && self.is_done(task)? {
+                done.insert(task);
+            }
+        }
+        Ok(())
+    }
+
     /// Whether a task is done: its result is there, as it is put in place whole.
     ///
     /// # Errors
@@ -285,7 +302,7 @@ impl Tasks {
 
 impl Files {
     /// Whether the result of a task is there.
-    pub fn has_result(&self, result: &Path) -> bool {
+    fn has_result(&self, result: &Path) -> bool {
         self.parts.contains(result.file_name().unwrap_or_default())
     }
 

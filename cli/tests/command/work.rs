@@ -143,6 +143,7 @@ fn what_fails_is_tried_again_and_then_left() {
 fn what_is_lost_or_damaged_is_made_again_or_named() {
     let parted = Parted::new("work-lost", 16);
     let work = ["work", &parted.dir, "--quiet"];
+    let (status, watch) = (["status", &parted.dir], ["status", &parted.dir, "--watch"]);
     parted.work(&[]);
     let remove =
         |names: &[&str]| names.iter().for_each(|name| fs::remove_file(parted.path(name)).expect("a file"));
@@ -156,7 +157,9 @@ fn what_is_lost_or_damaged_is_made_again_or_named() {
     for cut in [whole.len() - 1, whole.len() / 2, 3] {
         fs::remove_file(&mt).expect("a file");
         fs::write(&part, &whole[..cut]).expect("a file");
-        bad(1, &work, &["built-0-3.part: remove it, and `tetralod build --part 3/16` makes it again"]);
+        for told in [&work[..], &status, &watch] {
+            bad(1, told, &["built-0-3.part: remove it, and `tetralod build --part 3/16` makes it again"]);
+        }
         fs::remove_file(&part).expect("a file");
         assert_eq!(parted.work(&[])["tasks"], 2);
         parted.assert_built("after damage");
@@ -164,7 +167,9 @@ fn what_is_lost_or_damaged_is_made_again_or_named() {
     // So is the file.
     for cut in [parted.file.len() - 1, 3] {
         fs::write(&mt, &parted.file[..cut]).expect("a file");
-        bad(1, &work, &["built.mt is cut off: remove it, and `tetralod work"]);
+        for told in [&work[..], &status, &watch] {
+            bad(1, told, &["built.mt is cut off: remove it, and `tetralod work"]);
+        }
     }
     fs::write(&mt, &parted.file).expect("a file");
     // One with other bytes is found when it is read.
@@ -205,7 +210,10 @@ fn other_plans_and_versions_are_refused() {
     parted.work(&[]);
     good(&["part", &parted.input, "--parts", "2", "--position-bits", "8", "-o", &parted.dir]);
     assert!(!Path::new(&parted.path("built.mt")).exists(), "the file of the plan before");
-    bad(1, &["work", &parted.dir], &["is of another plan: remove it, or part the mesh into another folder"]);
+    for subcommand in ["work", "status"] {
+        let words = ["is of another plan: remove it, or part the mesh into another folder"];
+        bad(1, &[subcommand, &parted.dir], &words);
+    }
 }
 
 #[test]
