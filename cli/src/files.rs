@@ -169,12 +169,7 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
 
 /// Writes an MT with all that its file may keep of it; returns how many bytes that has.
 pub fn write_mt(path: &Path, mt: &Mt, exact: Vec<Exact>, metadata: BTreeMap<String, String>) -> Result<u64> {
-    write_file(path, |out| Ok(encode_to(mt, &options(exact, metadata), out)?))
-}
-
-/// How MT files are written.
-pub fn options(exact: Vec<Exact>, metadata: BTreeMap<String, String>) -> EncodeOptions {
-    EncodeOptions { check_margins: true, exact, histograms: true, index_page_bits: None, metadata }
+    write_file(path, |out| Ok(encode_to(mt, &EncodeOptions::complete(exact, metadata), out)?))
 }
 
 /// Works in a folder beside the place of an output; it is gone afterwards, also if the work fails.

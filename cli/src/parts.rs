@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
-use tetralod::format::BlockEncoder;
+use tetralod::format::{BlockEncoder, EncodeOptions};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
 use tetralod_build::parts::{
@@ -293,11 +293,10 @@ impl Folder<'_> {
                 parts::assemble_blocks(plan, (&left, &updates), &scratch, take, progress)
             });
             let Assembled { builder, summary, .. } = made?.map_err(said)?;
-            let mut mt = None;
+            let (options, mut mt) = (EncodeOptions::complete(Vec::new(), to.metadata.clone()), None);
             let bytes = to.sharding.write(to.path, |path| {
                 files::write_file(path, |out| {
-                    let (written, bytes) =
-                        encoder.finish(builder, &files::options(Vec::new(), to.metadata.clone()), out)?;
+                    let (written, bytes) = encoder.finish(builder, &options, out)?;
                     mt = Some(written.into());
                     Ok(bytes)
                 })

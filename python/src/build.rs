@@ -147,14 +147,7 @@ fn built(input: &Input, options: BuildOptions, watch: &mut Watch) -> PyResult<(V
     let own = config.construction.metadata().into_iter().chain(level.metadata());
     let metadata = own.chain(options.metadata).collect();
     let averaged = tetralod::mt::MultiTessellation::info(&built.mt).averaged_fields();
-    let encoding = EncodeOptions {
-        check_margins: true,
-        exact: built.exact,
-        histograms: true,
-        metadata,
-        index_page_bits: None,
-    };
-    let bytes = encode(&built.mt, &encoding).map_err(Failure::from)?;
+    let bytes = encode(&built.mt, &EncodeOptions::complete(built.exact, metadata)).map_err(Failure::from)?;
     let report = Report {
         kind: config.construction.kind().name(),
         method: config.construction.method().name(),

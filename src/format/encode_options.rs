@@ -20,3 +20,11 @@ pub struct EncodeOptions {
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
     pub metadata: BTreeMap<String, String>,
 }
+
+impl EncodeOptions {
+    /// For a file that has all that it may have.
+    #[doc(hidden)]
+    pub fn complete(exact: Vec<Exact>, metadata: BTreeMap<String, String>) -> Self {
+        Self { check_margins: true, exact, histograms: true, index_page_bits: None, metadata }
+    }
+}

@@ -231,14 +231,7 @@ impl MeshBuilder {
         stages.begin("encode")?;
         let built_by = config.construction.metadata().into_iter().chain(level.metadata());
         let metadata = built_by.chain(metadata).collect();
-        let encoding = EncodeOptions {
-            check_margins: true,
-            exact: built.exact,
-            histograms: true,
-            metadata,
-            index_page_bits: None,
-        };
-        let bytes = encode(&built.mt, &encoding)?;
+        let bytes = encode(&built.mt, &EncodeOptions::complete(built.exact, metadata))?;
         let (repaired, repair) =
             repaired.map_or_else(Default::default, |(done, repair)| (done.to_string(), Some(repair)));
         let said = Said { repaired, repair, notes, averaged: built.mt.info().averaged_fields() };
