@@ -1,5 +1,9 @@
 //! Writes the inputs that fuzzing starts from, made by code, into `corpus/<target>/`.
 
+#[path = "../../tests/support/exodus.rs"]
+mod exodus;
+
+use exodus::{Values, Variable, decomposed, netcdf};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::error::Error;
@@ -13,6 +17,7 @@ use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
 use tetralod_io::generate::by_name;
 use tetralod_io as io;
+use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
 use tetralod_fuzz::exercise::{NAMES, SCRIPT};
@@ -133,7 +138,7 @@ const HDF5_FILES: [&str; 7] = [
 
 /// A file that the tests have.
 fn data(name: &str) -> Result<Vec<u8>, Box<dyn Error>> {
-    Ok(fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data").join(name))?)
+    Ok(fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/io/tests/data").join(name))?)
 }
 
 /// Small meshes in most of the formats that are read.
@@ -170,52 +175,102 @@ fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     Ok(files)
 }
 
-/// A tetrahedron as Exodus in a format of netCDF's own: dimensions, variables, and their values.
+/// A tetrahedron as Exodus in a format of netCDF's own.
 fn classic(version: u8) -> Vec<u8> {
-    let word = |number: u64| match version {
-        5 => number.to_be_bytes().to_vec(),
-        _ => (number as u32).to_be_bytes().to_vec(),
+    let variable = |name: &str, dimensions: &[&'static str], kind: &'static str, values: Values| Variable {
+        name: name.to_owned(),
+        dimensions: dimensions.to_vec(),
+        kind,
+        values,
     };
-    let place = |number: usize| match version {
-        1 => (number as u32).to_be_bytes().to_vec(),
-        _ => (number as u64).to_be_bytes().to_vec(),
+    let along = |name: &str, values: [f64; 4]| {
+        variable(name, &["num_nodes"], "", Values::Floats(vec![values.to_vec()]))
     };
-    let tag = |number: u32| number.to_be_bytes().to_vec();
-    let text = |text: &str| {
-        let mut bytes = [word(text.len() as u64), text.as_bytes().to_vec()].concat();
-        bytes.resize(bytes.len().next_multiple_of(4), 0);
-        bytes
-    };
-    let dimensions = [("num_dim", 3), ("num_nodes", 4), ("num_el_in_blk1", 1), ("num_nod_per_el1", 4)];
-    let doubles = |values: [f64; 4]| values.iter().flat_map(|value| value.to_be_bytes()).collect::<Vec<u8>>();
-    let (integers, floats) = (4_u32, 6_u32);
-    let variables: [(&str, &[u64], u32, Vec<u8>); 4] = [
-        ("coordx", &[1], floats, doubles([0.0, 1.0, 0.0, 0.0])),
-        ("coordy", &[1], floats, doubles([0.0, 0.0, 1.0, 0.0])),
-        ("coordz", &[1], floats, doubles([0.0, 0.0, 0.0, 1.0])),
-        ("connect1", &[2, 3], integers, (1..=4_u32).flat_map(u32::to_be_bytes).collect()),
+    let corners = Values::Integers(vec![1, 2, 3, 4]);
+    let variables = [
+        along("coordx", [0.0, 1.0, 0.0, 0.0]),
+        along("coordy", [0.0, 0.0, 1.0, 0.0]),
+        along("coordz", [0.0, 0.0, 0.0, 1.0]),
+        variable("connect1", &["num_el_in_blk1", "num_nod_per_el1"], "TETRA", corners),
     ];
-    let head = |first: usize| {
-        let mut head = [b"CDF".to_vec(), vec![version], word(0), tag(10), word(4)].concat();
-        dimensions.iter().for_each(|(name, size)| head.extend([text(name), word(*size)].concat()));
-        head.extend([tag(0), word(0), tag(11), word(4)].concat());
-        let mut begin = first;
-        for (name, axes, kind, values) in &variables {
-            let axes: Vec<u8> =
-                [word(axes.len() as u64), axes.iter().flat_map(|axis| word(*axis)).collect()].concat();
-            let attributes = match *kind == integers {
-                true => [tag(12), word(1), text("elem_type"), tag(2), text("TETRA")].concat(),
-                false => [tag(0), word(0)].concat(),
-            };
-            head.extend(
-                [text(name), axes, attributes, tag(*kind), word(values.len() as u64), place(begin)].concat(),
-            );
-            begin += values.len();
-        }
-        head
+    let dimensions = [("num_dim", 3), ("num_nodes", 4), ("num_el_in_blk1", 1), ("num_nod_per_el1", 4)];
+    netcdf(version, &dimensions, &variables, 0)
+}
+
+/// A mesh in the XML of VTK, as text, with arrays that are left in the file where parts are read.
+fn as_text(mesh: &TetMesh) -> String {
+    let array = |kind: &str, name: &str, components: u32, values: Vec<String>| {
+        let values = values.join(" ");
+        format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"ascii\">{values}</DataArray>"
+        )
     };
-    let values = variables.iter().flat_map(|(.., values)| values.clone());
-    head(head(0).len()).into_iter().chain(values).collect()
+    let (points, cells) = (mesh.positions.len(), mesh.tets.len());
+    let positions = mesh.positions.as_flattened().iter().map(f64::to_string).collect();
+    let corners = mesh.tets.as_flattened().iter().map(u32::to_string).collect();
+    let [positions, corners, ends, types] = [
+        array("Float64", "points", 3, positions),
+        array("Int32", "connectivity", 1, corners),
+        array("Int32", "offsets", 1, (1..=cells).map(|end| (4 * end).to_string()).collect()),
+        array("UInt8", "types", 1, vec!["10".to_owned(); cells]),
+    ];
+    format!(
+        "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\"><Points>{positions}\
+         </Points><Cells>{corners}{ends}{types}</Cells></Piece></UnstructuredGrid></VTKFile>"
+    )
+}
+
+/// Samples in Zarr: in two chunks, as a shard with its index, in version 2, and as an image.
+fn arrays() -> Vec<Files> {
+    let array = |chunk: &str, codecs: &str| {
+        format!(
+            r#"{{"zarr_format": 3, "node_type": "array", "shape": [2, 2, 2], "data_type": "uint8", "chunk_grid": {{"name": "regular", "configuration":
+            {{"chunk_shape": {chunk}}}}}, "chunk_key_encoding": {{"name": "default"}}, "fill_value": 0, "codecs": [{codecs}],
+            "dimension_names": ["z", "y", "x"]}}"#
+        )
+        .into_bytes()
+    };
+    let bytes = r#"{"name": "bytes"}"#;
+    let sharded = r#"{"name": "sharding_indexed", "configuration": {"chunk_shape": [2, 2, 1], "codecs": [{"name": "bytes"}], "index_codecs":
+        [{"name": "bytes", "configuration": {"endian": "little"}}]}}"#;
+    let index = [0_u64, 4, 4, 4].map(u64::to_le_bytes).concat();
+    let old = r#"{"zarr_format": 2, "shape": [2, 2, 2], "chunks": [2, 2, 2], "dtype": "|u1", "compressor": null, "fill_value": 0, "order": "C",
+        "filters": null}"#;
+    let attributes = r#"{"_ARRAY_DIMENSIONS": ["z", "y", "x"], "scale_factor": 0.5, "units": "K"}"#;
+    let image = r#"{"zarr_format": 3, "node_type": "group", "attributes": {"ome": {"version": "0.5", "multiscales": [{"name": "i", "axes":
+        [{"name": "z", "type": "space", "unit": "nanometer"}, {"name": "y", "type": "space"}, {"name": "x", "type": "space"}], "datasets":
+        [{"path": "p", "coordinateTransformations": [{"type": "scale", "scale": [2, 1, 1]}]}]}]}}}"#;
+    vec![
+        vec![
+            ("a.zarr/zarr.json", array("[2, 2, 1]", bytes)),
+            ("a.zarr/c/0/0/0", b"ABCD".to_vec()),
+            ("a.zarr/c/0/0/1", b"EFGH".to_vec()),
+        ],
+        vec![
+            ("a.zarr/zarr.json", array("[2, 2, 2]", sharded)),
+            ("a.zarr/c/0/0/0", [b"ABCDEFGH", &index[..]].concat()),
+        ],
+        vec![
+            ("a.zarr/.zarray", old.into()),
+            ("a.zarr/.zattrs", attributes.into()),
+            ("a.zarr/0.0.0", b"ABCDEFGH".to_vec()),
+        ],
+        vec![
+            ("a.zarr/zarr.json", image.into()),
+            ("a.zarr/p/zarr.json", array("[2, 2, 2]", bytes)),
+            ("a.zarr/p/c/0/0/0", b"ABCDEFGH".to_vec()),
+        ],
+    ]
+}
+
+/// A mesh of Exodus in two pieces, with and without numbers of nodes.
+fn decompositions() -> [Files; 2] {
+    [true, false].map(|has_numbers| {
+        let (_, pieces) = decomposed(2, &|_, variables| {
+            variables.retain(|variable| has_numbers || variable.name != "node_num_map");
+        });
+        ["a.e.2.0", "a.e.2.1"].into_iter().zip(pieces).collect()
+    })
 }
 
 /// Files as the target `folder` takes them.
@@ -264,7 +319,7 @@ fn folders() -> Result<Vec<Files>, Box<dyn Error>> {
     let solution = b"MeshVersionFormatted 1\nDimension 3\nSolAtVertices 4 1 1\n1 2 3 4\nEnd\n".to_vec();
     let [first, second] = slices();
     let listed = |header: (&'static str, Vec<u8>)| vec![header, first.clone(), second.clone()];
-    Ok(vec![
+    let mut files = vec![
         vec![("a.nhdr", nrrd("encoding: raw\ndata file: a.raw\n")), ("a.raw", samples())],
         vec![("a.nhdr", nrrd("encoding: gzip\ndata file: a.raw.gz\n")), ("a.raw.gz", packed(&samples())?)],
         listed(("a.nhdr", nrrd("encoding: raw\ndata file: LIST\ns0.raw\ns1.raw\n"))),
@@ -288,5 +343,10 @@ fn folders() -> Result<Vec<Files>, Box<dyn Error>> {
         vec![("a.ele", cells), ("a.node", nodes)],
         vec![("a.mesh", medit.to_vec()), ("a.sol", solution)],
         vec![("a.vtu.gz", packed(&vtu)?)],
-    ])
+        vec![("a.vtu", vtu)],
+        vec![("a.vtu", as_text(&by_name("bucky", 5)?).into())],
+    ];
+    files.extend(arrays());
+    files.extend(decompositions());
+    Ok(files)
 }

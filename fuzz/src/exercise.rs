@@ -237,8 +237,11 @@ pub fn import(input: &[u8]) {
 /// The most memory that reading by a path may take.
 const MEMORY: u64 = 16 << 20;
 
+/// Tetrahedra of a range of cells.
+const TETS_OF_RANGE: u64 = 16;
+
 /// What files are called that come together; the first one of an input is read.
-pub const NAMES: [&str; 32] = [
+pub const NAMES: [&str; 42] = [
     "a.nhdr",
     "a.nrrd",
     "a.mhd",
@@ -271,6 +274,16 @@ pub const NAMES: [&str; 32] = [
     "a.vtu.gz",
     "a.raw.gz",
     "sub/a.vtu",
+    "a.e.2.0",
+    "a.e.2.1",
+    "a.zarr/zarr.json",
+    "a.zarr/c/0/0/0",
+    "a.zarr/c/0/0/1",
+    "a.zarr/.zarray",
+    "a.zarr/.zattrs",
+    "a.zarr/0.0.0",
+    "a.zarr/p/zarr.json",
+    "a.zarr/p/c/0/0/0",
 ];
 
 /// Files in a folder, and in memory: for each its number in [`NAMES`], its length in two bytes, and its content.
@@ -310,15 +323,24 @@ fn options(step: usize) -> io::ReadOptions {
     }
 }
 
-/// Reads some of the steps that a file stands for, and its pieces if it has some.
+/// Reads some of the steps that a file stands for, and its pieces or ranges of its cells, which together are the whole.
 fn read_by_path(path: &Path) {
     for step in io::steps(path).unwrap_or_default().iter().take(3) {
         let _ = io::read_with(&step.path, &options(step.number));
     }
-    #[cfg(not(target_arch = "wasm32"))]
-    if let Ok(Some(pieces)) = io::Pieces::open(path, &options(0)) {
+    let without_cells = io::ReadOptions { cells: io::CellData::Names, ..options(0) };
+    let listed = io::Pieces::open(path, &options(0)).ok().flatten();
+    let ranges = io::Pieces::open_ranges(path, &without_cells, Some(TETS_OF_RANGE)).ok().and_then(Result::ok);
+    for pieces in listed.into_iter().chain(ranges) {
         let _ = pieces.counts();
-        let _ = pieces.for_each(&mut |_| Ok::<(), io::ReadError>(()));
+        let mut tets = 0;
+        let read = pieces.for_each(&mut |piece| {
+            tets += piece.mesh.tets.len();
+            Ok::<(), io::ReadError>(())
+        });
+        if let (Ok(()), Ok(whole)) = (read, io::read_with(path, &without_cells)) {
+            assert_eq!(whole.tets.len(), tets, "pieces make a difference");
+        }
     }
 }
 
@@ -330,14 +352,17 @@ impl Folder {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let (process, number) = (std::process::id(), NUMBER.fetch_add(1, Relaxed));
         let path = std::env::temp_dir().join(format!("tetralod-fuzz-{process}-{number}"));
-        fs::create_dir_all(path.join("sub")).expect("a folder for temporary files");
+        fs::create_dir_all(&path).expect("a folder for temporary files");
         Self(path)
     }
 
+    /// Writes a file; returns by which path it is read.
     fn put(&self, name: &str, content: &[u8]) -> PathBuf {
         let path = self.0.join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder for temporary files");
         fs::write(&path, content).expect("a temporary file");
-        path
+        // Zarr is read by its folder.
+        if name.starts_with("a.zarr/") { self.0.join("a.zarr") } else { path }
     }
 }
 

@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn checksums_are_right_after_a_mutation() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data");
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/io/tests/data");
         for (name, least) in
             [("steps.vtkhdf", 20), ("netcdf4.exo", 10), ("dense.vtkhdf", 10), ("pieces.vtkhdf", 0)]
         {
