@@ -8,14 +8,33 @@ pub(super) fn shift(bits: u32) -> u32 {
     (bits + 1).saturating_sub(CUT_BITS)
 }
 
-/// The longest axis along which tetrahedra can be cut, and the first place behind the cut, given their places along each axis: the least
-/// and the largest, and how many there are at each.
-pub(super) fn best_cut(
-    spans: &[[usize; 2]; 3],
-    counts: &[Vec<u32>; 3],
-    step: [f64; 3],
-) -> Option<(usize, usize)> {
-    let length = |axis: usize| (spans[axis][1].saturating_sub(spans[axis][0])) as f64 * step[axis];
+/// How many tetrahedra of each part are at each place along each axis.
+pub(super) struct Places(Vec<[Vec<u32>; 3]>);
+
+impl Places {
+    pub fn of(parts: usize) -> Self {
+        Self(vec![[0, 1, 2].map(|_| vec![0; 1 << CUT_BITS]); parts])
+    }
+
+    /// Adds a tetrahedron of a part.
+    pub fn add(&mut self, part: u16, place: [usize; 3]) {
+        self.0[usize::from(part)].iter_mut().zip(place).for_each(|(counts, x)| counts[x] += 1);
+    }
+
+    /// The [best cut](best_cut) of each part.
+    pub fn cuts(&self, step: [f64; 3]) -> Option<Vec<(usize, usize)>> {
+        self.0.iter().map(|counts| best_cut(counts, step)).collect()
+    }
+}
+
+/// The longest axis along which tetrahedra can be cut, and the first place behind the cut, given how many there are at each place along each
+/// axis.
+pub(super) fn best_cut(counts: &[Vec<u32>; 3], step: [f64; 3]) -> Option<(usize, usize)> {
+    let length = |axis: usize| {
+        let mut used = (0..).zip(&counts[axis]).filter(|(_, n)| **n > 0).map(|(x, _)| x);
+        let first = used.next().unwrap_or(0_u32);
+        f64::from(used.last().unwrap_or(first) - first) * step[axis]
+    };
     let mut axes = [0, 1, 2];
     axes.sort_by(|&a, &b| length(b).total_cmp(&length(a)));
     axes.into_iter().find_map(|axis| Some((axis, half(&counts[axis])?)))

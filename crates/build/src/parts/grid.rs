@@ -254,8 +254,6 @@ impl<'a> GridCut<'a> {
             let mut cuts = Vec::with_capacity(boxes.len());
             let mut halves = Vec::with_capacity(2 * boxes.len());
             for cells in boxes {
-                let spans =
-                    [0, 1, 2].map(|axis: usize| [place(cells[axis].start), place(cells[axis].end - 1)]);
                 let counts = [0, 1, 2].map(|axis: usize| {
                     let others: u32 =
                         (0..3).filter(|&k| k != axis).map(|k: usize| cells[k].len() as u32).product();
@@ -264,8 +262,8 @@ impl<'a> GridCut<'a> {
                     counts
                 });
                 let tetrahedra = self.mesh.counts()[1];
-                let (axis, behind) = best_cut(&spans, &counts, lattice.step)
-                    .ok_or(PartsError::TooMany { parts, tetrahedra })?;
+                let (axis, behind) =
+                    best_cut(&counts, lattice.step).ok_or(PartsError::TooMany { parts, tetrahedra })?;
                 let first =
                     cells[axis].clone().find(|&cell| place(cell) >= behind).unwrap_or(cells[axis].end);
                 let (mut below, mut above) = (cells.clone(), cells);

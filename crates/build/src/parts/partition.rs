@@ -3,7 +3,7 @@
 //! A tetrahedron is where its lowest corner is along the axis of a cut: the six of a grid's cube stay together, so cuts of grids are flat.
 
 use super::PartsError;
-use super::cut::{CUT_BITS, best_cut, shift};
+use super::cut::{Places, shift};
 use super::fragments::{InParts, ends, joined, ranks};
 use super::grid::GridCut;
 use super::piece::{Part, Piece, Sided};
@@ -122,21 +122,11 @@ fn parts_of(tets: &[[u32; 4]], quantized: &Quantized, parts: u32) -> Result<Vec<
     };
     let mut part_of = vec![0_u16; tets.len()];
     for level in 0..parts.ilog2() {
-        let now = 1_usize << level;
-        let mut spans = vec![[[usize::MAX, 0]; 3]; now];
-        let mut counts = vec![[const { Vec::new() }; 3]; now];
-        counts.iter_mut().flatten().for_each(|all| *all = vec![0_u32; 1 << CUT_BITS]);
+        let mut places = Places::of(1 << level);
         for (tet, &part) in tets.iter().zip(&part_of) {
-            for axis in 0..3 {
-                let x = place(tet, axis);
-                let [low, high] = &mut spans[part as usize][axis];
-                (*low, *high) = ((*low).min(x), (*high).max(x));
-                counts[part as usize][axis][x] += 1;
-            }
+            places.add(part, [0, 1, 2].map(|axis| place(tet, axis)));
         }
-        let cuts: Option<Vec<(usize, usize)>> =
-            spans.iter().zip(&counts).map(|(spans, counts)| best_cut(spans, counts, step)).collect();
-        let cuts = cuts.ok_or(PartsError::TooMany { parts, tetrahedra: tets.len() as u64 })?;
+        let cuts = places.cuts(step).ok_or(PartsError::TooMany { parts, tetrahedra: tets.len() as u64 })?;
         for (tet, part) in tets.iter().zip(&mut part_of) {
             let (axis, first) = cuts[*part as usize];
             *part = 2 * *part + u16::from(place(tet, axis) >= first);

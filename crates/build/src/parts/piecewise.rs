@@ -4,7 +4,7 @@
 //! The parts are those that [`part`](super::part) makes of the whole, byte for byte. What several passes need lies in a [`Scratch`].
 
 use super::PartsError;
-use super::cut::{CUT_BITS, best_cut, shift};
+use super::cut::{Places, shift};
 use super::fragments::{Band, Fragments, PieceParts};
 use super::partition::{between, shared_faces};
 use super::piece::Part;
@@ -386,27 +386,13 @@ impl<'a> Piecewise<'a> {
             self.keep(&format!("places-{index}"), &places)?;
         }
         for level in 0..self.parts.ilog2() {
-            let now = 1_usize << level;
-            let mut spans = vec![[[usize::MAX, 0]; 3]; now];
-            let mut counts = vec![[const { Vec::new() }; 3]; now];
-            counts.iter_mut().flatten().for_each(|all| *all = vec![0_u32; 1 << CUT_BITS]);
+            let mut all = Places::of(1 << level);
             for index in 0..self.pieces {
                 let places: Vec<[u16; 3]> = self.kept(&format!("places-{index}"))?;
-                for place in places {
-                    let part = usize::from(of.part_of(place));
-                    for axis in 0..3 {
-                        let x = usize::from(place[axis]);
-                        let [low, high] = &mut spans[part][axis];
-                        (*low, *high) = ((*low).min(x), (*high).max(x));
-                        counts[part][axis][x] += 1;
-                    }
-                }
+                places.into_iter().for_each(|place| all.add(of.part_of(place), place.map(usize::from)));
             }
-            let step = of.lattice.step;
-            let cuts: Option<Vec<(usize, usize)>> =
-                spans.iter().zip(&counts).map(|(spans, counts)| best_cut(spans, counts, step)).collect();
             let too_many = PartsError::TooMany { parts: self.parts, tetrahedra: self.sums.tets };
-            of.cuts.push(cuts.ok_or(too_many)?);
+            of.cuts.push(all.cuts(of.lattice.step).ok_or(too_many)?);
         }
         for index in 0..self.pieces {
             self.scratch.remove(&format!("places-{index}"))?;
