@@ -12,9 +12,9 @@ use crate::cell_types::{POLYHEDRON, VERTICES, is_flat};
 use crate::cells::{self, CellList, Indices, Split};
 use crate::error::{ReadError, ReadReason, Stop};
 use crate::numbering::Numbering;
-use crate::vtu::{first_number, in_order};
+use crate::vtu::{FirstFields, first_number};
 use crate::{MemoryLimit, PieceCounts, ReadOptions};
-use tetralod::mesh::{Field, MeshPiece, TetMesh};
+use tetralod::mesh::{MeshPiece, TetMesh};
 
 /// Cells whose types are looked at together, and points that come together.
 const CELLS: u64 = 1 << 16;
@@ -176,8 +176,7 @@ fn end_before(grid: &dyn Grid, cell: u64) -> Result<i64, ReadError> {
 #[derive(Default)]
 pub(super) struct Before {
     points: usize,
-    /// The fields of the first one, without values, at points and at cells.
-    fields: Option<[Vec<Field>; 2]>,
+    fields: FirstFields,
 }
 
 impl Before {
@@ -228,21 +227,7 @@ impl Before {
         options.memory.take(24 * rows.len() as u64).map_err(|reason| Stop::from(reason).at(place))?;
         let mut mesh = grid.fields(rows, options)?;
         mesh.positions = grid.positions(rows)?;
-        let TetMesh { fields, cell_fields, .. } = &mut mesh;
-        match &self.fields {
-            None => {
-                self.fields = Some(
-                    [&*fields, &*cell_fields]
-                        .map(|fields| fields.iter().map(Field::without_values).collect()),
-                );
-            }
-            Some(known) => {
-                for (known, fields) in known.iter().zip([fields, cell_fields]) {
-                    *fields = in_order(known, std::mem::take(fields))
-                        .map_err(|reason| Stop::from(reason).at(place))?;
-                }
-            }
-        }
+        self.fields.order(&mut mesh).map_err(|reason| Stop::from(reason).at(place))?;
         Ok(mesh)
     }
 }

@@ -6,8 +6,8 @@ use crate::error::{At, ReadError};
 use crate::fields::settle_unused;
 use crate::numbering::Numbering;
 use crate::pvtu::{Identity, Key, numbered};
-use crate::vtu::{NumberPoints, in_order};
-use tetralod::mesh::{Field, MeshPiece, Middles, TetMesh};
+use crate::vtu::{FirstFields, NumberPoints};
+use tetralod::mesh::{MeshPiece, Middles, TetMesh};
 
 /// A hash of what a point is known by.
 pub(super) fn hash(key: Key) -> u64 {
@@ -34,8 +34,7 @@ pub(super) struct SharedPoints {
     first: Vec<[f64; 3]>,
     values: Vec<f64>,
     points: usize,
-    /// The fields of the first piece, without values, at points and at cells.
-    fields: Option<[Vec<Field>; 2]>,
+    fields: FirstFields,
 }
 
 impl SharedPoints {
@@ -67,17 +66,7 @@ impl SharedPoints {
             numbers.push((self.points + new.len()) as u32);
             new.push(index);
         }
-        match &self.fields {
-            None => {
-                let names =
-                    |fields: &[Field]| fields.iter().map(Field::without_values).collect::<Vec<Field>>();
-                self.fields = Some([names(&mesh.fields), names(&mesh.cell_fields)]);
-            }
-            Some([fields, cell_fields]) => {
-                mesh.fields = in_order(fields, mesh.fields).at(place)?;
-                mesh.cell_fields = in_order(cell_fields, mesh.cell_fields).at(place)?;
-            }
-        }
+        self.fields.order(&mut mesh).at(place)?;
         let first = self.points as u32;
         // The points that an earlier piece has.
         let old: Vec<usize> = (0..numbers.len()).filter(|&i| numbers[i] < first).collect();

@@ -336,8 +336,27 @@ fn join_fields(fields: &mut [Field], more: Vec<Field>) -> Result<(), ReadReason>
     Ok(())
 }
 
+/// The fields of the first of several pieces, without values, at points and at cells.
+#[derive(Default)]
+pub(super) struct FirstFields(Option<[Vec<Field>; 2]>);
+
+impl FirstFields {
+    /// Puts the fields of a piece in the order of those of the first one, which must be the same.
+    pub fn order(&mut self, mesh: &mut TetMesh) -> Result<(), ReadReason> {
+        let own = [&mut mesh.fields, &mut mesh.cell_fields];
+        let Some(first) = &self.0 else {
+            self.0 = Some(own.map(|fields| fields.iter().map(Field::without_values).collect()));
+            return Ok(());
+        };
+        for (first, fields) in first.iter().zip(own) {
+            *fields = in_order(first, std::mem::take(fields))?;
+        }
+        Ok(())
+    }
+}
+
 /// The fields of a piece in the order of those of the first one, which must be the same.
-pub(super) fn in_order(first: &[Field], mut own: Vec<Field>) -> Result<Vec<Field>, ReadReason> {
+fn in_order(first: &[Field], mut own: Vec<Field>) -> Result<Vec<Field>, ReadReason> {
     let missing = |what: String| Err(ReadReason::Missing(what));
     if let Some(extra) = own.iter().find(|field| !first.iter().any(|known| known.name == field.name)) {
         return missing(format!("array \"{}\", which this piece has, in an earlier piece", extra.name));
