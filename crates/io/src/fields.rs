@@ -363,6 +363,11 @@ pub(super) fn settle_unused(mesh: &mut TetMesh) {
     values.filter(|value| !value.is_finite()).for_each(|value| *value = 0.0);
 }
 
+/// All fields are of this time.
+pub(super) fn set_time(mesh: &mut TetMesh, time: Option<f64>) {
+    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+}
+
 /// Length of a vector, without overflow on the way.
 fn length(vector: &[f64]) -> f64 {
     let largest = vector.iter().fold(0.0_f64, |m, x| m.max(x.abs()));

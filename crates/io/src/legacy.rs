@@ -6,7 +6,7 @@
 
 use crate::cells::{CellList, Indices};
 use crate::error::{At, ReadError, ReadReason, expect_count, shown};
-use crate::fields::{Collector, check_finite, check_finite_cells, tell};
+use crate::fields::{Collector, check_finite, check_finite_cells, set_time, tell};
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
 use crate::grid::{self, Ghosts, GridValues, Placement};
 use crate::number::{NumberType, points_from};
@@ -37,7 +37,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
         "rectilinear_grid" => body.rectilinear()?,
         _ => body.structured()?,
     };
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+    set_time(&mut mesh, time);
     Ok(mesh)
 }
 

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use crate::MemoryLimit;
 use crate::beside::{FilesOf, place};
 use crate::error::{At, ReadError, ReadReason, Stop, in_file};
+use crate::fields::set_time;
 use crate::file_kind::without_mark;
 #[cfg(feature = "hdf5")]
 use crate::formats::exodus_pieces::{Decomposition, ExodusPieces};
@@ -24,7 +25,7 @@ use crate::xml::Document;
 #[cfg(feature = "zarr")]
 use crate::zarr::{self, GridInParts};
 use crate::{CellData, PieceCounts, ReadOptions, packed};
-use tetralod::mesh::{MeshPiece, TetMesh};
+use tetralod::mesh::MeshPiece;
 
 /// A mesh of which a piece is read at a time.
 #[derive(Debug)]
@@ -220,9 +221,8 @@ impl Pieces {
             self.each_reader(file, &mut |reader| {
                 let place = || format!("piece {}, <PointData>", reader.number);
                 let mut piece = shared.read(Identity::Places, &mut |numbers| reader.read(numbers), &place)?;
-                let MeshPiece { mesh: TetMesh { fields, cell_fields, input, .. }, .. } = &mut piece;
-                input.files.0.extend(files.last());
-                fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
+                piece.mesh.input.files.0.extend(files.last());
+                set_time(&mut piece.mesh, time);
                 each(piece)
             })
         })?;

@@ -120,7 +120,6 @@ fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<T
             _ => return Err(not_read(kind)).at(String::new),
         },
     };
-    let time = document.time().or(of_pieces);
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+    fields::set_time(&mut mesh, document.time().or(of_pieces));
     Ok(mesh)
 }

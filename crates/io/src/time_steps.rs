@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use thiserror::Error;
 
-use crate::fields::tell;
+use crate::fields::{set_time, tell};
 use crate::{CellData, ReadError, ReadOptions};
 use tetralod::geom::bits_of;
 use tetralod::mesh::{Field, GeometryField, StepError, TetMesh, default_field};
@@ -77,7 +77,7 @@ pub fn read_time_steps(
             append(&mut mesh, *first_time, later, &options, read)?;
         }
     } else if let Some(time) = *first_time {
-        set_time(&mut mesh, time);
+        set_time(&mut mesh, Some(time));
     }
     Ok(mesh)
 }
@@ -128,7 +128,7 @@ fn append(
 ) -> Result<(), TimeStepsError> {
     let first_time = first_time.or_else(|| time_of(mesh));
     let mut times = HashSet::from([bits_of(first_time.unwrap_or(0.0))]);
-    set_time(mesh, first_time.unwrap_or(0.0));
+    set_time(mesh, first_time.or(Some(0.0)));
     for (number, (file, time)) in later.iter().enumerate() {
         let file = || file.clone();
         let mut next = read(number + 1, options)?;
@@ -140,7 +140,7 @@ fn append(
         if !times.insert(bits_of(time)) {
             return Err(TimeStepsError::SameTime { file: file(), time });
         }
-        set_time(&mut next, time);
+        set_time(&mut next, Some(time));
         let same = |field: &Field| options.fields.as_ref().is_some_and(|names| names.contains(&field.name));
         next.fields.retain(same);
         next.cell_fields.retain(same);
@@ -152,10 +152,6 @@ fn append(
 
 fn time_of(mesh: &TetMesh) -> Option<f64> {
     mesh.fields.iter().chain(&mesh.cell_fields).find_map(|field| field.time)
-}
-
-fn set_time(mesh: &mut TetMesh, time: f64) {
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = Some(time));
 }
 
 impl tetralod::Coded for TimeStepsError {

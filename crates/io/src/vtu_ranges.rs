@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::cells::Indices;
 use crate::error::{At, ReadError, ReadReason, Stop};
-use crate::fields::Collector;
+use crate::fields::{Collector, set_time};
 use crate::file_kind::without_mark;
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE};
 use crate::number::points_from;
@@ -171,8 +171,7 @@ impl InPieces for VtuFile {
         for (reader, ranges) in readers(&document, options).zip(&self.pieces) {
             let grid = self.grid(&reader)?;
             before.for_each(&grid, &ranges.ranges, options, &mut |mut piece| {
-                let TetMesh { fields, cell_fields, .. } = &mut piece.mesh;
-                fields.iter_mut().chain(cell_fields).for_each(|field| field.time = time);
+                set_time(&mut piece.mesh, time);
                 each(piece)
             })?;
         }

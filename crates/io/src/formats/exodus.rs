@@ -10,7 +10,7 @@ use netcdf_reader::{NcFile, NcGroup, NcSliceInfo, NcSliceInfoElem, NcVariable};
 use crate::ReadOptions;
 use crate::cell_types::POLYHEDRON;
 use crate::error::{At, ReadError, ReadReason, expect_count};
-use crate::fields::{Collector, component_name};
+use crate::fields::{Collector, component_name, set_time};
 use crate::formats::draft::Draft;
 use crate::formats::exodus_cells::{Element, element};
 use crate::formats::hdf5_values::{checked_times, netcdf_reason};
@@ -103,8 +103,7 @@ impl<'a> Reader<'a> {
             let name = known.get(&(*number as i64)).map_or("", String::as_str);
             mesh.input.name_label("block", *number as i64, name);
         }
-        let time = times.get(options.step).copied();
-        mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+        set_time(&mut mesh, times.get(options.step).copied());
         Ok(mesh)
     }
 

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 
 use crate::beside::FilesOf;
 use crate::error::{At, ReadError, ReadReason, shown};
+use crate::fields::set_time;
 use crate::formats::gmsh_layout::{Layout, Numbers, Version};
 use crate::formats::gmsh_mesh::Mesh;
 use crate::formats::gmsh_sections::{read_elements, read_entities, read_nodes, read_partitions};
@@ -156,8 +157,7 @@ impl Mesh<'_> {
         self.draft.notes.extend(skipped);
         let mut mesh = self.draft.finish().at(|| "$Elements".into())?;
         self.names.iter().for_each(|(group, name)| mesh.input.name_label("physical", *group, name));
-        let time = steps.times.get(step).copied();
-        mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+        set_time(&mut mesh, steps.times.get(step).copied());
         Ok(mesh)
     }
 

@@ -11,7 +11,7 @@ use hdf5_reader::{Dataset, Hdf5File};
 use crate::cell_types;
 use crate::cells::{self, CellList, Indices};
 use crate::error::{At, ReadError, ReadReason, expect_count};
-use crate::fields::{Collector, check_finite, check_finite_cells};
+use crate::fields::{Collector, check_finite, check_finite_cells, set_time};
 use crate::formats::hdf5_values::{
     all_integers, attribute_values, checked_times, floats, integers, number_kind, reason, row_length, rows,
 };
@@ -75,7 +75,7 @@ pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, Re
             return Err(ReadReason::unsupported(what, remedy)).at(|| ROOT.to_owned());
         }
     };
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+    set_time(&mut mesh, time);
     Ok(mesh)
 }
 

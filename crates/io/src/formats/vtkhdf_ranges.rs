@@ -7,6 +7,7 @@ use hdf5_reader::{Dataset, Hdf5File};
 
 use crate::cells::Indices;
 use crate::error::{At, ReadError, ReadReason, Stop, expect_count};
+use crate::fields::set_time;
 use crate::formats::hdf5;
 use crate::formats::hdf5_values::{floats, integers, row_length};
 use crate::formats::vtkhdf::{Piece, ROOT, Reader, UNSTRUCTURED};
@@ -114,11 +115,6 @@ impl InPieces for HdfFile {
             each(piece)
         })
     }
-}
-
-/// All fields are of this time.
-fn set_time(mesh: &mut TetMesh, time: Option<f64>) {
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
 }
 
 /// A piece of a file.
