@@ -17,7 +17,7 @@ use crate::formats::exodus_pieces::{Decomposition, ExodusPieces};
 use crate::formats::vtkhdf_ranges::HdfFile;
 use crate::listed::{for_each_file, names};
 use crate::pvtu::{Identity, bits};
-use crate::ranges::InPieces;
+use crate::ranges::{Each, InPieces};
 use crate::shared_points::{SharedPoints, hash};
 use crate::vtu::PieceReader;
 use crate::vtu_ranges::VtuFile;
@@ -177,7 +177,7 @@ impl Pieces {
         in_file(error, &self.path.display().to_string())
     }
 
-    fn read_all(&self, each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>) -> Result<(), ReadError> {
+    fn read_all(&self, each: Each<'_>) -> Result<(), ReadError> {
         let each = &mut |mut piece: MeshPiece| {
             if piece.mesh.input.files.0.is_empty() {
                 piece.mesh.input.files.0.push(self.path.clone());
@@ -200,11 +200,7 @@ impl Pieces {
         })
     }
 
-    fn read_listed(
-        &self,
-        document: &Document<'_>,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), ReadError> {
+    fn read_listed(&self, document: &Document<'_>, each: Each<'_>) -> Result<(), ReadError> {
         let files = FilesOf::on_disk(&self.path, &self.options.memory);
         let beside = |file: &str| files.load(file);
         let mut hashes = Vec::new();

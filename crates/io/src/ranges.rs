@@ -24,15 +24,14 @@ const NEAR: u64 = 1 << 15;
 /// Tetrahedra of a range, at least.
 const LEAST_TETS: u64 = 1 << 20;
 
+/// Takes a piece.
+pub(super) type Each<'a> = &'a mut dyn FnMut(MeshPiece) -> Result<(), ReadError>;
+
 /// A file whose mesh comes in pieces.
 pub(super) trait InPieces: Debug {
     fn counts(&self) -> PieceCounts;
     /// Passes on all pieces.
-    fn for_each(
-        &self,
-        options: &ReadOptions,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), Stop>;
+    fn for_each(&self, options: &ReadOptions, each: Each<'_>) -> Result<(), Stop>;
 }
 
 /// A grid of which parts are read.
@@ -186,7 +185,7 @@ impl Before {
         grid: &dyn Grid,
         ranges: &[Range<u64>],
         options: &ReadOptions,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
+        each: Each<'_>,
     ) -> Result<(), Stop> {
         let [points, _] = grid.counts();
         let count = usize::try_from(points).unwrap_or(usize::MAX);

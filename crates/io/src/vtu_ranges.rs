@@ -11,13 +11,13 @@ use crate::fields::{Collector, set_time};
 use crate::file_kind::without_mark;
 use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE};
 use crate::number::points_from;
-use crate::ranges::{Before, Grid, InPieces, Ranges, Rows};
+use crate::ranges::{Before, Each, Grid, InPieces, Ranges, Rows};
 use crate::skeleton::{Skeleton, left_in_file};
 use crate::stored::{Bytes, Stored};
 use crate::vtu::{PieceReader, readers};
 use crate::xml::{Array, Document, Place};
 use crate::{CellData, PieceCounts, ReadOptions, format_of, packed};
-use tetralod::mesh::{MeshInput, MeshPiece, TetMesh};
+use tetralod::mesh::{MeshInput, TetMesh};
 
 /// Bytes that are read at a time where all are passed over.
 const STEP: usize = 1 << 20;
@@ -160,11 +160,7 @@ impl InPieces for VtuFile {
         counts.in_layers()
     }
 
-    fn for_each(
-        &self,
-        options: &ReadOptions,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), Stop> {
+    fn for_each(&self, options: &ReadOptions, each: Each<'_>) -> Result<(), Stop> {
         let document = self.document()?;
         let time = self.time(&document);
         let mut before = Before::default();

@@ -18,12 +18,12 @@ use crate::formats::hdf5;
 use crate::in_memory::Shared;
 use crate::number::points_from;
 use crate::pvtu::{Identity, Whole, bits, key_of};
-use crate::ranges::InPieces;
+use crate::ranges::{Each, InPieces};
 use crate::shared_points::{SharedPoints, hash};
 use crate::{PieceCounts, ReadOptions};
 use hdf5_reader::BytesStorage;
 use hdf5_reader::storage::DynStorage;
-use tetralod::mesh::{MeshPiece, TetMesh};
+use tetralod::mesh::TetMesh;
 
 /// The pieces of a mesh.
 #[derive(Debug)]
@@ -314,11 +314,7 @@ impl InPieces for ExodusPieces {
         self.counts
     }
 
-    fn for_each(
-        &self,
-        options: &ReadOptions,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), Stop> {
+    fn for_each(&self, options: &ReadOptions, each: Each<'_>) -> Result<(), Stop> {
         let mut hashes = Vec::new();
         self.decomposition.for_each(options, &mut |piece| {
             match piece.identity {

@@ -14,10 +14,10 @@ use crate::formats::vtkhdf::{Piece, ROOT, Reader, UNSTRUCTURED};
 use crate::ghosts::GHOST_TYPE;
 use crate::number::points_from;
 use crate::pvtu::{Identity, bits};
-use crate::ranges::{Before, Grid, InPieces, Ranges, Rows};
+use crate::ranges::{Before, Each, Grid, InPieces, Ranges, Rows};
 use crate::shared_points::{SharedPoints, hash};
 use crate::{PieceCounts, ReadOptions};
-use tetralod::mesh::{MeshInput, MeshPiece, TetMesh};
+use tetralod::mesh::{MeshInput, TetMesh};
 
 /// A file with an unstructured grid.
 pub(crate) struct HdfFile {
@@ -70,11 +70,7 @@ impl HdfFile {
     }
 
     /// Passes on the partitions of a file with several, each of which has points of its own.
-    fn partitions(
-        &self,
-        options: &ReadOptions,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), ReadError> {
+    fn partitions(&self, options: &ReadOptions, each: Each<'_>) -> Result<(), ReadError> {
         let afresh = || ReadOptions { memory: options.memory.afresh(), ..options.clone() };
         let mut hashes = Vec::new();
         for (number, piece) in self.pieces.iter().enumerate() {
@@ -102,11 +98,7 @@ impl InPieces for HdfFile {
         self.counts
     }
 
-    fn for_each(
-        &self,
-        options: &ReadOptions,
-        each: &mut dyn FnMut(MeshPiece) -> Result<(), ReadError>,
-    ) -> Result<(), Stop> {
+    fn for_each(&self, options: &ReadOptions, each: Each<'_>) -> Result<(), Stop> {
         let [piece] = &self.pieces[..] else { return Ok(self.partitions(options, each)?) };
         let (reader, _, time) = Reader::of(&self.file, options)?;
         let grid = HdfGrid { reader: &reader, piece, number: 0 };
