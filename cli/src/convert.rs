@@ -38,7 +38,7 @@ struct Report {
     kind: &'static str,
     from: &'static str,
     vertices: u32,
-    tetrahedra: u32,
+    tetrahedra: u64,
     updates: u32,
     file_bytes: u64,
     /// In how many shards the file is, if these were asked for.

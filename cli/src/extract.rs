@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     after.extend(report.measured_error.map(|error| ("measured error", output::number(error))));
     let mut before = vec![("file", arguments.output.display().to_string())];
     if mesh.tets.len() < opened.session.mesh().map_or(0, CurrentMesh::tet_count) {
-        let [vertices, tets] = [mesh.positions.len(), mesh.tets.len()].map(|count| count as u32);
+        let (vertices, tets) = (mesh.positions.len() as u32, mesh.tets.len() as u64);
         before.push(("in regions", output::mesh(vertices, tets)));
     }
     let rows = [before, after];

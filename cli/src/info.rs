@@ -37,7 +37,7 @@ struct Report {
     #[serde(skip)]
     updates_are: &'static str,
     vertices: u32,
-    tetrahedra: u32,
+    tetrahedra: u64,
     base_vertices: u32,
     base_tetrahedra: u32,
     updates: u32,
@@ -129,7 +129,7 @@ struct Region {
     /// Its value in each of the arrays.
     labels: Vec<i64>,
     /// In the reference mesh, as are the next ones.
-    tetrahedra: u32,
+    tetrahedra: u64,
     volume: f64,
     bounds: [f64; 6],
     /// Its place in the palette of regions.
@@ -521,7 +521,7 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
     let mut rows = vec![
         ("kind", report.updates_are.to_owned()),
         ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
-        ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
+        ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra.into())),
         ("updates", format!("{}{depth}", output::count(report.updates))),
     ];
     rows.extend(structure.map(|all| {

@@ -126,7 +126,7 @@ pub fn count(number: impl Into<u64>) -> String {
 }
 
 /// The size of a mesh, for people.
-pub fn mesh(vertices: u32, tetrahedra: u32) -> String {
+pub fn mesh(vertices: u32, tetrahedra: u64) -> String {
     format!("{} vertices, {} tetrahedra", count(vertices), count(tetrahedra))
 }
 

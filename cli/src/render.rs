@@ -299,7 +299,8 @@ fn rows(target: &Target, report: &Report) -> Vec<(&'static str, String)> {
 /// What the picture says of itself.
 fn description(file: &Path, report: &Report, mesh: &Summary) -> String {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let mut text = format!("{name}: {}, {}", mesh.field(), output::mesh(mesh.vertices, mesh.tetrahedra));
+    let mut text =
+        format!("{name}: {}, {}", mesh.field(), output::mesh(mesh.vertices, mesh.tetrahedra.into()));
     if let Some(bound) = mesh.error_bound {
         text += &format!(", error at most {}", output::number(bound));
     }

@@ -58,7 +58,7 @@ const VERTEX_BYTES: u64 = 240;
 
 /// About the most memory that a verification takes.
 fn memory(mt: &Mt, input: &TetMesh) -> u64 {
-    let [vertices, tets] = [input.positions.len() as u64, u64::from(mt.info().tetrahedra)];
+    let [vertices, tets] = [input.positions.len() as u64, mt.info().tetrahedra];
     let fields = (input.fields.len() + 3) as u64;
     let of_tet = if matches!(mt, Mt::Edge(_)) { EDGE_TET_BYTES } else { TET_BYTES };
     mt.bytes() + (16 + of_tet) * tets + (VERTEX_BYTES + 8 * fields) * vertices

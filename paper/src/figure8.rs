@@ -30,7 +30,7 @@ pub fn curves(data: &DataSet, isovalue: Option<f64>) -> Result<Curves> {
     };
     Ok(Curves {
         variable: isovalue.is_some(),
-        reference: data.models.first().map_or(0, |model| u64::from(model.mt.info().tetrahedra)),
+        reference: data.models.first().map_or(0, |model| model.mt.info().tetrahedra),
         curves: data.models.iter().map(curve).collect::<Result<_>>()?,
     })
 }

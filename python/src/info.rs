@@ -15,7 +15,7 @@ use tetralod::view::region_color;
 struct InfoObject<'a> {
     kind: &'static str,
     vertices: u32,
-    tetrahedra: u32,
+    tetrahedra: u64,
     base_vertices: usize,
     base_tetrahedra: usize,
     updates: u32,
@@ -67,7 +67,7 @@ struct RegionsObject<'a> {
 struct RegionObject<'a> {
     name: &'a str,
     labels: &'a [i64],
-    tetrahedra: u32,
+    tetrahedra: u64,
     volume: f64,
     bounds: [f64; 6],
     color: String,

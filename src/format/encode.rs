@@ -141,6 +141,7 @@ impl File {
             tet_errors: mt.has_tet_errors(),
             sides: mt.regions().is_some_and(Regions::has_sides),
             index_pages: self.index_pages,
+            many_tets: payload::has_many_tets(mt.info()),
             exact: self.has_exact,
         }))?;
         self.front.iter().try_for_each(|section| section.put(put))?;

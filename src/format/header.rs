@@ -20,6 +20,8 @@ const TET_ERRORS: u32 = 1;
 const SIDES: u32 = 1 << 1;
 /// And: the index is in pages.
 const INDEX_PAGES: u32 = 1 << 2;
+/// And: there are so many tetrahedra that their number has 64 bits.
+const MANY_TETS: u32 = 1 << 3;
 /// A hint in files without an index: exact values stand behind the updates.
 const EXACT: u32 = 1 << 16;
 
@@ -34,6 +36,8 @@ pub struct Start {
     pub sides: bool,
     /// Whether the index is in pages, each a section of its own.
     pub index_pages: bool,
+    /// Whether the number of tetrahedra has 64 bits: more than a file without could state.
+    pub many_tets: bool,
     /// Whether exact values stand behind the updates, as far as the header says so: it does where there is no index.
     pub exact: bool,
 }
@@ -41,8 +45,9 @@ pub struct Start {
 /// A header.
 pub fn header(start: Start) -> [u8; HEADER_BYTES] {
     let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
-    let critical = flag(start.tet_errors, TET_ERRORS) | flag(start.sides, SIDES);
-    let flags = critical | flag(start.index_pages, INDEX_PAGES) | flag(start.exact, EXACT);
+    let of_updates = flag(start.tet_errors, TET_ERRORS) | flag(start.sides, SIDES);
+    let critical = of_updates | flag(start.index_pages, INDEX_PAGES) | flag(start.many_tets, MANY_TETS);
+    let flags = critical | flag(start.exact, EXACT);
     let mut bytes = [0; HEADER_BYTES];
     bytes[..8].copy_from_slice(&MAGIC);
     bytes[8..10].copy_from_slice(&VERSION.to_le_bytes());
@@ -72,7 +77,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
         return Err(FormatError::UnsupportedVersion { found, supported: VERSION });
     }
     let flags = u32_at(12);
-    if flags & CRITICAL_FLAGS & !(TET_ERRORS | SIDES | INDEX_PAGES) != 0 {
+    if flags & CRITICAL_FLAGS & !(TET_ERRORS | SIDES | INDEX_PAGES | MANY_TETS) != 0 {
         return Err(FormatError::UnsupportedFeature {
             offset: 12,
             what: "a flag that this reader does not know",
@@ -84,6 +89,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
         tet_errors: flags & TET_ERRORS != 0,
         sides: flags & SIDES != 0,
         index_pages: flags & INDEX_PAGES != 0,
+        many_tets: flags & MANY_TETS != 0,
         exact: flags & EXACT != 0,
     })
 }

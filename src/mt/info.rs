@@ -139,7 +139,7 @@ pub struct MtInfo {
     /// Vertices of the reference mesh.
     pub vertices: u32,
     /// Tetrahedra of the reference mesh.
-    pub tetrahedra: u32,
+    pub tetrahedra: u64,
     /// Updates of the complete MT.
     pub updates: u32,
     /// The displacement of the boundary, in model units, that counts as an error of 1 (where cells are small, less may count as

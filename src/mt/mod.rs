@@ -89,6 +89,8 @@ pub use info::{FieldInfo, MtInfo, MtKind};
 #[doc(hidden)]
 pub use margins::{Excess, Margins};
 #[doc(hidden)]
+#[doc(hidden)]
+pub use mesh::base::MAX_VERTICES;
 pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 #[doc(hidden)]
 pub use mesh::current::mix;

@@ -29,7 +29,7 @@ pub struct RegionInfo {
     /// Its place in a palette of distinct colours, counted from 0: regions that touch each other have different ones.
     pub color: u8,
     /// Its tetrahedra in the reference mesh.
-    pub tetrahedra: u32,
+    pub tetrahedra: u64,
     /// Its volume in the reference mesh, in cubed model units.
     pub volume: f64,
     /// The box around it there: its least and its largest corner, on the lattice.

@@ -798,10 +798,10 @@ fn least_affordable(reached: &Reached, most: u64, index: &Index, updates: u32) -
 /// About twice as many updates as a budget has room for: of the blocks with the largest errors, not all are applied.
 fn updates_within(budget: &Budget, mt: &Mt) -> Option<u64> {
     let (info, base) = (mt.info(), mt.base());
-    let new = |all: u32, base: usize| f64::from(all) - base as f64;
+    let new = |all: u64, base: usize| all as f64 - base as f64;
     let growth = new(info.tetrahedra, base.tets.len()) / f64::from(info.updates.max(1));
-    let of_tets = budget.tets.map(|tets| new(tets, base.tets.len()) / growth);
-    let of_vertices = budget.vertices.map(|vertices| new(vertices, base.positions.len()));
+    let of_tets = budget.tets.map(|tets| new(tets.into(), base.tets.len()) / growth);
+    let of_vertices = budget.vertices.map(|vertices| new(vertices.into(), base.positions.len()));
     let of_bytes = budget.bytes.map(|bytes| bytes as f64 / (32.0 * growth + 16.0));
     let limits = [of_tets, of_vertices, of_bytes].into_iter().flatten();
     limits.reduce(f64::min).map(|updates| (2.0 * updates).max(0.0) as u64)

@@ -2,6 +2,7 @@
 
 mod blocks;
 mod bounds;
+mod counts;
 mod damaged;
 mod extremes;
 mod facts;

@@ -384,7 +384,7 @@ fn random_request(subject: &Subject, random: &mut Random) -> Request {
         Bounds { min: [0, 1, 2].map(|i| at(i, min[i])), max: [0, 1, 2].map(|i| at(i, min[i] + max[i])) };
     let field = (part(0.0, 0.999) * info.fields.len() as f64) as usize;
     let isovalue = info.fields[field].min + part(0.0, 1.0) * info.fields[field].range();
-    let budget = (part(0.0, 1.1) * f64::from(info.tetrahedra)) as u32;
+    let budget = (part(0.0, 1.1) * info.tetrahedra as f64) as u32;
     let error = [0.0, 0.002, 0.02, 0.1, 0.3, f64::INFINITY][random.below(6)];
     let roi = random.once_in(2).then_some(Region::Box(roi));
     let isovalues = if random.once_in(2) { vec![isovalue] } else { Vec::new() };

@@ -102,7 +102,7 @@ proptest! {
         let n = oracle.nodes.len();
         prop_assert_eq!(found.updates as usize, n);
         prop_assert_eq!(found.vertices, built.info.vertices);
-        prop_assert_eq!(found.tetrahedra, built.info.tetrahedra);
+        prop_assert_eq!(u64::from(found.tetrahedra), built.info.tetrahedra);
         prop_assert_eq!(found.mt_vertices as usize, oracle.positions.len());
         let arcs: usize = oracle.parents.iter().map(BTreeSet::len).sum();
         prop_assert_eq!(found.arcs, arcs as u64);

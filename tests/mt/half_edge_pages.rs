@@ -270,7 +270,7 @@ fn small_steps_end_where_a_large_one_does() {
                 request.needs[0].part = Part::Both(region.clone(), values);
             }
             let criterion = Arc::new(LodCriterion::new(mt.info(), &request));
-            let tets = mt.info().tetrahedra;
+            let tets = mt.info().tetrahedra as u32;
             // Room for all, for all but little, or for a part.
             let budget = match random.below(6) {
                 0 => Budget::default(),

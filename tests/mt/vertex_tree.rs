@@ -55,7 +55,7 @@ fn insertion(base: BaseMesh, at: [i32; 3], removed: &[u32], faces: &[[u32; 3]]) 
         lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: POSITION_BITS },
         fields: vec![field],
         vertices: new + 1,
-        tetrahedra: (base.tets.len() + star.len() - removed.len()) as u32,
+        tetrahedra: (base.tets.len() + star.len() - removed.len()) as u64,
         updates: 1,
         displacement_per_error: 1.0,
         quantization: 0.0,

@@ -189,10 +189,10 @@ proptest! {
         for (by, part, sort, updates) in moves {
             wishes.iter_mut().for_each(|wish| *wish = wish.moved(&by, 0.1));
             let info = subject.mt.info();
-            let of = |all: u32| (part * f64::from(all)) as u32;
+            let of = |all: u64| (part * all as f64) as u32;
             let budget = match sort {
                 0 => Budget { tets: Some(of(info.tetrahedra)), ..Budget::default() },
-                1 => Budget { vertices: Some(of(info.vertices)), ..Budget::default() },
+                1 => Budget { vertices: Some(of(info.vertices.into())), ..Budget::default() },
                 _ => Budget { bytes: Some(u64::from(of(info.tetrahedra)) * 40), ..Budget::default() },
             };
             let request = Request { budget, ..request(subject, &wishes) };

@@ -263,7 +263,7 @@ fn error_zero_is_the_reference_mesh() {
 fn budgets_leave_no_memory_of_what_was_before() {
     for subject in SUBJECTS.iter() {
         let mt = &subject.vertex;
-        let all = mt.info().tetrahedra;
+        let all = mt.info().tetrahedra as u32;
         let requests: Vec<Request> = (subject.requests().into_iter().enumerate())
             .map(|(i, request)| request.at_most(all / (2 + i as u32 % 9)))
             .collect();

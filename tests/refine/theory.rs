@@ -32,7 +32,7 @@ impl Wish {
             max: [0, 1, 2].map(|i| at(i, roi[i][0].max(roi[i][1]))),
         });
         let value = |part: &f64| info.fields[field].min + part * info.fields[field].range();
-        let max_tets = self.budget.map(|part| (part * f64::from(info.tetrahedra)) as u32);
+        let max_tets = self.budget.map(|part| (part * info.tetrahedra as f64) as u32);
         let isovalues: Vec<f64> = self.isovalues.iter().map(value).collect();
         let need = Need::within(self.error).limited(roi.map(Region::Box), field, &isovalues);
         Request { needs: vec![need], budget: Budget { tets: max_tets, ..Budget::default() } }

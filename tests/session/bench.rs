@@ -21,7 +21,7 @@ fn rates_are_counts_over_seconds() {
     let bytes = encode(&mt.clone().into(), &EncodeOptions::default()).expect("a whole MT");
     let report = bench::run(&bytes, &mut ticking(), 0.1).expect("a good file");
     assert_eq!((report.updates, report.applied), (mt.updates(), mt.updates()));
-    assert_eq!(report.tetrahedra, mt.info().tetrahedra);
+    assert_eq!(u64::from(report.tetrahedra), mt.info().tetrahedra);
     assert!(report.runs > 3 && report.runs < 100, "{report:?}");
     let near = |rate: f64, count: u32| (rate * 1e-3 - f64::from(count)).abs() < 1e-6 * f64::from(count);
     assert!(near(report.decode_updates, report.updates), "{report:?}");

@@ -360,7 +360,7 @@ fn info(reference: (usize, usize), fields: usize, updates: usize) -> MtInfo {
         lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: POSITION_BITS },
         fields: (0..fields).map(field).collect(),
         vertices: reference.0 as u32,
-        tetrahedra: reference.1 as u32,
+        tetrahedra: reference.1 as u64,
         updates: updates as u32,
         displacement_per_error: 1.0,
         quantization: 0.0,

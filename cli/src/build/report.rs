@@ -54,7 +54,7 @@ pub fn rows_of(counts: &BuildSummary) -> [(&'static str, String); 3] {
     let &BuildSummary { vertices, tetrahedra, base_vertices, base_tetrahedra, updates, depth, .. } = counts;
     [
         ("reference mesh", output::mesh(vertices, tetrahedra)),
-        ("base mesh", output::mesh(base_vertices, base_tetrahedra)),
+        ("base mesh", output::mesh(base_vertices, base_tetrahedra.into())),
         ("updates", format!("{}, at most {} deep", output::count(updates), output::count(depth))),
     ]
 }
@@ -69,7 +69,7 @@ fn said(regions: usize) -> String {
 
 pub(super) fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
     let counts = &report.counts;
-    let removed = f64::from(counts.tetrahedra.saturating_sub(counts.base_tetrahedra));
+    let removed = counts.tetrahedra.saturating_sub(counts.base_tetrahedra.into()) as f64;
     let mut rows = vec![("file", output.display().to_string())];
     rows.extend(rows_of(counts));
     rows.extend([

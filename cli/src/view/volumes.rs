@@ -77,7 +77,7 @@ struct Shown {
     path: PathBuf,
     version: String,
     vertices: u32,
-    tetrahedra: u32,
+    tetrahedra: u64,
     fields: usize,
     bytes: u64,
 }
@@ -114,7 +114,7 @@ struct Listed {
     /// Another one when the file has changed.
     version: String,
     vertices: u32,
-    tetrahedra: u32,
+    tetrahedra: u64,
     fields: usize,
     bytes: u64,
 }

@@ -22,7 +22,7 @@ pub struct BuildSummary {
     /// Vertices of the reference mesh.
     pub vertices: u32,
     /// Tetrahedra of the reference mesh.
-    pub tetrahedra: u32,
+    pub tetrahedra: u64,
     /// Vertices of the base mesh.
     pub base_vertices: u32,
     /// Tetrahedra of the base mesh.

@@ -72,6 +72,6 @@ pub(super) fn inserted_mt(
     let sequence = insert::insert(&quantized, &mesh.tets, tet_errors, progress)?;
     let grown: usize = sequence.steps.iter().map(|step| step.inserted.len()).sum();
     let shrunk: usize = sequence.steps.iter().map(|step| step.removed.len()).sum();
-    let info = quantized.info(sequence.base.len() + grown - shrunk, displacement_per_error);
+    let info = quantized.info((sequence.base.len() + grown - shrunk) as u64, displacement_per_error);
     sequence.explicit_mt(info, &quantized, progress)
 }

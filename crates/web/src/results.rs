@@ -69,7 +69,7 @@ pub fn info(session: &Session) -> Option<JsInfo> {
         ("bounds", list(&[x0, y0, z0, x1, y1, z1])),
         ("origin", list(&info.single_points().origin)),
         ("vertices", info.vertices.into()),
-        ("tetrahedra", info.tetrahedra.into()),
+        ("tetrahedra", (info.tetrahedra as f64).into()),
         ("updates", info.updates.into()),
         ("exactValues", session.decoder().exact_status().name().into()),
         ("regions", session.regions().map_or(JsValue::UNDEFINED, |all| regions(all, info))),
@@ -87,7 +87,7 @@ fn regions(regions: &Regions, info: &MtInfo) -> JsValue {
         object(&[
             ("name", region.name.as_str().into()),
             ("labels", list(&labels)),
-            ("tetrahedra", region.tetrahedra.into()),
+            ("tetrahedra", (region.tetrahedra as f64).into()),
             ("volume", region.volume.into()),
             ("bounds", list(corners.as_flattened())),
             ("color", format!("#{r:02x}{g:02x}{b:02x}").into()),

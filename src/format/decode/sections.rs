@@ -57,7 +57,7 @@ impl Decoder {
             return Err(content.out_of_place());
         }
         let offset = self.bytes;
-        let (info, metadata) = payload::read_info(content)?;
+        let (info, metadata) = payload::read_info(content, self.head.start.many_tets)?;
         let codec = codec_of(info.kind);
         if self.head.start.tet_errors && !codec.has_tet_errors {
             let what = "errors of tetrahedra in an MT of a kind that has none";

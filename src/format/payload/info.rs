@@ -28,9 +28,10 @@ pub fn write_info(
         return Err(EncodeError::TooLong { what: "a metadata key or value" });
     }
     out.push(number_of(info.kind));
-    for count in [info.vertices, info.tetrahedra, info.updates] {
-        write::u32(out, count);
-    }
+    write::u32(out, info.vertices);
+    let tetrahedra = info.tetrahedra.to_le_bytes();
+    out.extend_from_slice(if has_many_tets(info) { &tetrahedra } else { &tetrahedra[..4] });
+    write::u32(out, info.updates);
     for number in info.lattice.origin.into_iter().chain(info.lattice.step) {
         write::f64(out, number);
     }
@@ -58,11 +59,22 @@ pub fn write_info(
     Ok(())
 }
 
-pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatError> {
+/// Whether there are so many tetrahedra that their number has 64 bits. The header says so of a file.
+pub fn has_many_tets(info: &MtInfo) -> bool {
+    info.tetrahedra > u64::from(u32::MAX)
+}
+
+pub fn read_info(mut reader: Reader<'_>, many_tets: bool) -> Result<(MtInfo, Metadata), FormatError> {
     let number = reader.u8()?;
     let codec = CODECS.iter().find(|codec| codec.number == number);
     let kind = codec.ok_or_else(|| reader.corrupt("the kind of MT is not known"))?.kind;
-    let [vertices, tetrahedra, updates] = [reader.u32()?, reader.u32()?, reader.u32()?];
+    let vertices = reader.u32()?;
+    let [low, high] = [reader.u32()?, if many_tets { reader.u32()? } else { 0 }];
+    let tetrahedra = u64::from(high) << 32 | u64::from(low);
+    if many_tets && high == 0 {
+        return Err(reader.corrupt("a number of tetrahedra has 64 bits although 32 are enough"));
+    }
+    let updates = reader.u32()?;
     let lattice = Lattice { origin: reader.f64x3()?, step: reader.f64x3()?, bits: u32::from(reader.u8()?) };
     let displacement_per_error = reader.f64()?;
     let count = reader.u8()?;

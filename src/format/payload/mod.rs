@@ -26,7 +26,7 @@ pub use changes::FieldPart;
 use codec::{Codec, Head, Started};
 use families::BASE_LEVEL;
 pub use families::parts;
-pub use info::{Metadata, read_info, write_info};
+pub use info::{Metadata, has_many_tets, read_info, write_info};
 use kind_codec::KindCodec;
 
 /// Puts what is coded of the base mesh.

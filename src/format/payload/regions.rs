@@ -29,7 +29,7 @@ pub fn write(out: &mut Vec<u8>, regions: &Regions, index: &Index) -> Result<(), 
         write::string(out, &region.name);
         region.labels.iter().for_each(|&label| write::varint(out, ((label << 1) ^ (label >> 63)) as u64));
         out.push(region.color);
-        write::varint(out, u64::from(region.tetrahedra));
+        write::varint(out, region.tetrahedra);
         write::f64(out, region.volume);
         bounds::write(out, region.bounds);
     }
@@ -97,7 +97,7 @@ fn read_region(reader: &mut Reader<'_>, arrays: usize, bits: u32) -> Result<Regi
         region.labels.push((code >> 1) as i64 ^ -((code & 1) as i64));
     }
     region.color = reader.u8()?;
-    region.tetrahedra = reader.varint()?;
+    region.tetrahedra = reader.varint64()?;
     region.volume = read_amount(reader)?;
     region.bounds = bounds::read_corners(reader, bits)?;
     Ok(region)

@@ -191,6 +191,7 @@ impl HalfEdgeMt {
         marks: &[BaseMark],
         regions: Option<(&[u16], &[i32])>,
     ) -> CurrentMesh {
+        mesh.look_for_all_tags();
         mesh.tag_all(marks.iter().map(|mark| mark.remover));
         mesh.keep_tet_bytes(marks.iter().map(|mark| mark.inner).collect());
         mesh.whole_stars = true;

@@ -2,7 +2,7 @@
 
 use crate::geom::{WIDE_BITS, orient3d};
 use crate::mesh::{Averaged, Extreme, Extremes};
-use crate::mt::{FieldInfo, MtInfo};
+use crate::mt::{FieldInfo, MtInfo, MtKind};
 use thiserror::Error;
 
 /// The coarsest mesh of an MT, on the lattices.
@@ -128,8 +128,11 @@ impl MtInfo {
         if !self.displacement_per_error.is_finite() || self.displacement_per_error < 0.0 {
             return Err(BaseMeshError::Info("the displacement per error must be finite and not negative"));
         }
-        if self.updates > MAX_UPDATES {
-            return Err(BaseMeshError::Info("an MT has at most 2^30 updates"));
+        if self.kind != MtKind::HalfEdge && self.updates > MAX_UPDATES {
+            return Err(BaseMeshError::Info("an MT of this kind has at most 2^30 updates"));
+        }
+        if self.vertices.max(self.updates) > MAX_VERTICES {
+            return Err(BaseMeshError::Info("an MT has at most 2^32 - 2 vertices, and no more updates"));
         }
         Ok(())
     }
@@ -158,5 +161,8 @@ fn has_sound_extremes(field: &FieldInfo) -> bool {
 /// Finest field lattice.
 pub const MAX_FIELD_BITS: u32 = 24;
 
-/// Most updates that an MT can have: vertex numbers stay below 2^32.
+/// Most updates that an edge-based or vertex-based MT can have: the first has two vertices for each, the second tags beside the numbers.
 pub const MAX_UPDATES: u32 = 1 << 30;
+
+/// Most vertices of an MT, and most updates of a half-edge MT: numbers have 32 bits, and all ones mean none.
+pub const MAX_VERTICES: u32 = u32::MAX - 1;

@@ -8,6 +8,7 @@
 //! Guarantees: after every operation [`CurrentMesh::check`] holds. Positions and field levels are integers, so the
 //! mesh depends on the set of applied updates alone, not on their order or on the platform.
 
+use super::FIRST_ANONYMOUS_TAG;
 use super::base::{BaseMesh, BaseMeshError};
 use super::paged_array::PagedArray;
 use super::side_slots::SideSlots;
@@ -103,6 +104,8 @@ pub struct CurrentMesh {
     pub(crate) fields: usize,
     /// The MT's tag of each tetrahedron; empty for kinds of MT that need none.
     pub(in crate::mt) tags: Vec<u32>,
+    /// Tags from here on are not looked for.
+    pub(super) first_anonymous_tag: u32,
     /// A byte that the kind keeps for each tetrahedron; none unless it asked for them.
     pub(super) tet_bytes: Vec<u8>,
     pub(super) has_tet_bytes: bool,
@@ -148,7 +151,7 @@ impl CurrentMesh {
         let updates = info.updates as usize;
         let vertices = self.labels.len().saturating_add(updates);
         let tets = self.tets.len().saturating_add(updates.saturating_mul(super::limits::MAX_STAR));
-        let tets = tets.min(info.tetrahedra as usize);
+        let tets = tets.min(usize::try_from(info.tetrahedra).unwrap_or(usize::MAX));
         make_room(&mut self.labels, vertices);
         make_room(&mut self.positions, vertices);
         make_room(&mut self.levels, vertices.saturating_mul(self.fields));
@@ -193,6 +196,7 @@ impl CurrentMesh {
             slot_of,
             fields: info.fields.len(),
             tags: Vec::new(),
+            first_anonymous_tag: FIRST_ANONYMOUS_TAG,
             tet_bytes: Vec::new(),
             has_tet_bytes: false,
             regions: Vec::new(),

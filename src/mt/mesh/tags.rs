@@ -3,7 +3,7 @@
 use super::current::CurrentMesh;
 use crate::mesh::NONE;
 
-/// Tags from here on are not looked for.
+/// Tags from here on are not looked for, unless a kind of MT says [otherwise](CurrentMesh::look_for_all_tags).
 pub(crate) const FIRST_ANONYMOUS_TAG: u32 = 1 << 31;
 
 impl CurrentMesh {
@@ -13,6 +13,11 @@ impl CurrentMesh {
         for (t, tag) in (0..self.tets.len() as u32).zip(tags) {
             self.set_tag(t, tag);
         }
+    }
+
+    /// From now on all tags but [`NONE`] are looked for.
+    pub(in crate::mt) fn look_for_all_tags(&mut self) {
+        self.first_anonymous_tag = NONE;
     }
 
     /// Keeps a byte for each tetrahedron from now on.
@@ -48,7 +53,7 @@ impl CurrentMesh {
         self.tags[t as usize]
     }
 
-    /// Gives tetrahedron `t` a tag. Those of at least [`FIRST_ANONYMOUS_TAG`] are not looked for by
+    /// Gives tetrahedron `t` a tag. Those of at least [`FIRST_ANONYMOUS_TAG`] are, by default, not looked for by
     /// [`CurrentMesh::tagged`].
     #[inline]
     pub(crate) fn set_tag(&mut self, t: u32, tag: u32) {
@@ -56,7 +61,7 @@ impl CurrentMesh {
         if self.place_of.get(old) == t {
             self.place_of.set(old, NONE);
         }
-        if tag < FIRST_ANONYMOUS_TAG {
+        if tag < self.first_anonymous_tag {
             self.place_of.set(tag, t);
         }
     }
@@ -109,8 +114,28 @@ impl CurrentMesh {
     #[inline]
     pub(in crate::mt) fn place_tag(&mut self, t: u32) {
         let tag = self.tags[t as usize];
-        if tag < FIRST_ANONYMOUS_TAG {
+        if tag < self.first_anonymous_tag {
             self.place_of.set(tag, t);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::stars::tests::wheel;
+    use super::*;
+
+    #[test]
+    fn half_edge_mts_have_tags_for_all_updates() {
+        let large = [0, FIRST_ANONYMOUS_TAG - 1, FIRST_ANONYMOUS_TAG, u32::MAX - 2, NONE];
+        let mut mesh = wheel(5);
+        mesh.tag_all(large);
+        assert_eq!(large.map(|tag| mesh.tagged(tag)), [Some(0), Some(1), None, None, None]);
+        let mut mesh = wheel(5);
+        mesh.look_for_all_tags();
+        mesh.tag_all(large);
+        assert_eq!(large.map(|tag| mesh.tagged(tag)), [Some(0), Some(1), Some(2), Some(3), None]);
+        mesh.set_tag(3, FIRST_ANONYMOUS_TAG + 1);
+        assert_eq!([u32::MAX - 2, FIRST_ANONYMOUS_TAG + 1].map(|tag| mesh.tagged(tag)), [None, Some(3)]);
     }
 }

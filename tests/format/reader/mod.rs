@@ -71,7 +71,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         assert_eq!(&section.kind, kind);
         section
     };
-    let mut info = wire::info(next(b"INFO").payload);
+    let mut info = wire::info(next(b"INFO").payload, file[12] & 8 == 8);
     let section = (info.kind == 3).then(|| next(b"INDX"));
     let in_pages = file[12] & 4 == 4;
     assert!(!in_pages || info.kind == 3);

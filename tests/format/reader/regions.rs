@@ -8,7 +8,7 @@ pub struct Region {
     pub name: String,
     pub labels: Vec<i64>,
     pub color: u8,
-    pub tetrahedra: u32,
+    pub tetrahedra: u64,
     pub volume: f64,
     pub bounds: [[i32; 3]; 2],
 }
@@ -66,6 +66,6 @@ fn region(bytes: &mut Bytes<'_>, arrays: usize, info: &Info) -> Region {
     let labels = (0..arrays).map(|_| label(bytes)).collect();
     let color = bytes.u8();
     assert!(color < 12);
-    let tetrahedra = bytes.varint();
+    let tetrahedra = bytes.varint64();
     Region { name, labels, color, tetrahedra, volume: bytes.f64(), bounds: bounds_of(bytes, info) }
 }

@@ -102,7 +102,7 @@ pub fn sections(file: &[u8]) -> Vec<Section<'_>> {
     assert_eq!(header.take(8), [0x89, 0x54, 0x4C, 0x4F, 0x44, 0x0D, 0x0A, 0x1A]);
     assert_eq!(header.u16(), 2, "the version");
     let _reserved = header.u16();
-    assert!(header.u32() & 0xFFFF <= 7, "critical flags");
+    assert!(header.u32() & 0xFFFF <= 15, "critical flags");
     let total = header.u64();
     assert!(total == 0 || total == file.len() as u64);
     let _reserved = header.u32();
@@ -155,7 +155,7 @@ pub struct Extreme {
 pub struct Info {
     pub kind: u8,
     pub vertices: u32,
-    pub tetrahedra: u32,
+    pub tetrahedra: u64,
     pub updates: u32,
     pub origin: [f64; 3],
     pub step: [f64; 3],
@@ -166,11 +166,12 @@ pub struct Info {
     pub rounding: f64,
 }
 
-pub fn info(mut bytes: Bytes<'_>) -> Info {
+/// `many_tets`: flag 3 of the header.
+pub fn info(mut bytes: Bytes<'_>, many_tets: bool) -> Info {
     let mut info = Info {
         kind: bytes.u8(),
         vertices: bytes.u32(),
-        tetrahedra: bytes.u32(),
+        tetrahedra: if many_tets { bytes.u64() } else { u64::from(bytes.u32()) },
         updates: bytes.u32(),
         origin: [0; 3].map(|_| bytes.f64()),
         step: [0; 3].map(|_| bytes.f64()),
@@ -180,7 +181,12 @@ pub fn info(mut bytes: Bytes<'_>) -> Info {
         metadata: Vec::new(),
         rounding: 0.0,
     };
-    assert!([0, 1, 3].contains(&info.kind) && info.updates <= 1 << 30 && (1..=30).contains(&info.bits));
+    assert_eq!(info.tetrahedra >> 32 > 0, many_tets);
+    assert!(
+        [0, 1, 3].contains(&info.kind)
+            && (info.kind == 3 || info.updates <= 1 << 30)
+            && (1..=30).contains(&info.bits)
+    );
     for _ in 0..bytes.u8() {
         let field = Field {
             name: bytes.string(),

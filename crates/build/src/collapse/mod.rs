@@ -48,7 +48,7 @@ pub fn edge_mt(
     let quantized = quantize::quantize_cells(mesh, config)?;
     frozen.iter_mut().zip(kept_points(config, mesh)?).for_each(|(frozen, kept)| *frozen |= kept);
     let diagonal = Bounds::of(&mesh.positions).diagonal();
-    let info = quantized.info(mesh.tets.len(), config.displacement * diagonal);
+    let info = quantized.info(mesh.tets.len() as u64, config.displacement * diagonal);
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
     let reference = Reference::new(&quantized, &work, info.displacement_per_error, config.displacement_edges);
     let mut builder = Builder::new(work, reference, &info, frozen);

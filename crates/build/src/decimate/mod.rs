@@ -141,7 +141,7 @@ fn decimate_into(
     let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
     let mut state = State::new(work, reference, non_manifold, levels);
     state.restrictions = restrictions;
-    let info = quantized.info(tetrahedra, displacement_per_error);
+    let info = quantized.info(tetrahedra as u64, displacement_per_error);
     record.start(&info, state.mesh.tets.len());
     let mut decimator = Decimator::new(state, gift_wrap, record);
     decimator.remove_all(progress)?;

@@ -64,13 +64,13 @@ impl Quantized {
 
     /// What is known of the MT of a mesh of so many tetrahedra; not how many updates it has. `displacement_per_error`: model units of
     /// displacement that count as an error of 1.
-    pub fn info(&self, tetrahedra: usize, displacement_per_error: f64) -> MtInfo {
+    pub fn info(&self, tetrahedra: u64, displacement_per_error: f64) -> MtInfo {
         MtInfo {
             kind: MtKind::Vertex,
             lattice: self.lattice,
             fields: self.fields.clone(),
             vertices: self.positions.len() as u32,
-            tetrahedra: tetrahedra as u32,
+            tetrahedra,
             updates: 0,
             displacement_per_error,
             quantization: self.quantization,

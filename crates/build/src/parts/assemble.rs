@@ -314,7 +314,7 @@ impl<'a> Assembly<'a> {
         let numbered = number_base(&piece.positions, &vertices.levels, info.fields.len(), &piece.tets);
         let summary = BuildSummary::of(&info, &numbered.mesh, 0);
         let base = numbered.mesh.positions.len() as u32;
-        let mut number = vec![NONE; plan.counts[0] as usize];
+        let mut number = vec![NONE; plan.counts.0 as usize];
         for (&point, &v) in piece.points.iter().zip(&numbered.number) {
             number[point as usize] = v;
         }

@@ -320,7 +320,7 @@ impl<'a> GridCut<'a> {
                 self.points().map(|at| self.grid.point(at))
             }),
         }
-        let [vertices, tetrahedra] = self.mesh.counts().map(|count| count as u32);
+        let [points, tetrahedra] = self.mesh.counts();
         let ends = [[0; 3], self.grid.dims.map(|n| n - 1)].map(|index| self.grid.point(index));
         let moved = |index| {
             position_lattice::distance(self.grid.point(index), self.lattice.point(self.position(index)))
@@ -329,7 +329,8 @@ impl<'a> GridCut<'a> {
             kind: MtKind::HalfEdge,
             lattice: self.lattice,
             fields,
-            vertices,
+            // No grid of more is cut.
+            vertices: points as u32,
             tetrahedra,
             updates: 0,
             displacement_per_error: config.displacement * Bounds::of(&ends).diagonal(),

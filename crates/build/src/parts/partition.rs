@@ -60,7 +60,7 @@ pub fn part(
     let quantized = quantize::quantize_cells(mesh, config)?;
     let restrictions = Restrictions::of(config, mesh, &quantized, BuildCriterion::HalfEdge)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
-    let info = quantized.info(mesh.tets.len(), displacement_per_error);
+    let info = quantized.info(mesh.tets.len() as u64, displacement_per_error);
     let whole = (parts, checksum(mesh), domain(&quantized.positions));
     let regions = restrictions.region_table().map(PlanRegions::new);
     let plan = Plan::new(&info, config, purpose, whole, (regions, &quantized.sides.jumps), metadata);

@@ -450,7 +450,7 @@ impl Part {
         let rise = |points: &[u32]| points.windows(2).all(|pair| pair[0] < pair[1]);
         let mut sorted = piece.points.clone();
         sorted.sort_unstable();
-        let known = sorted.last().is_none_or(|&last| last < plan.counts[0]);
+        let known = sorted.last().is_none_or(|&last| last < plan.counts.0);
         expect(known && rise(&sorted) && rise(&piece.points[..piece.vertices]), "its points are others")?;
         let side = 1_i32.checked_shl(plan.lattice.2).filter(|_| plan.lattice.2 <= 30).unwrap_or(0);
         let is_on = |p: &[i32; 3]| p.iter().all(|x| (0..=side).contains(x));
@@ -551,7 +551,7 @@ impl PartUpdates {
         expect(lengths == [count; 4] && rows.errors.len() == count * fields, "its updates lack parts")?;
         let inserted: usize = rows.stars.iter().map(|&star| usize::from(star)).sum();
         expect([rows.removers.len(), rows.inner.len()] == [inserted; 2], "its updates lack tetrahedra")?;
-        let known = |&v: &u32| v < plan.counts[0];
+        let known = |&v: &u32| v < plan.counts.0;
         expect(rows.vertices.iter().chain(&rows.near).all(known), "its updates have other points")?;
         let fits = |&code: &RemoverCode| match Remover::from(code) {
             Remover::Nothing => true,

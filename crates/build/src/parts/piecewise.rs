@@ -409,7 +409,7 @@ impl<'a> Piecewise<'a> {
         let Sums { bounds, points, tets, hashers: [positions, cells], of_fields, .. } = &self.sums;
         let alone = quantize::lattices_alone(of.lattice, of.fields.clone(), quantization);
         Restrictions::of_angles(self.config, &alone)?;
-        let mut info = alone.info(*tets as usize, self.config.displacement * bounds.diagonal());
+        let mut info = alone.info(*tets, self.config.displacement * bounds.diagonal());
         info.vertices = *points;
         let mut checksum = positions.clone();
         checksum.combine(cells);

@@ -56,7 +56,7 @@ pub struct Plan {
     pub(super) sides: [i32; 3],
     pub(super) fields: Vec<PlanField>,
     /// Reference vertices and tetrahedra of the whole.
-    pub(super) counts: [u32; 2],
+    pub(super) counts: (u32, u64),
     pub(super) displacement_per_error: f64,
     pub(super) displacement_edges: f64,
     pub(super) quantization: f64,
@@ -155,7 +155,7 @@ impl PlanField {
 pub(super) struct PlanRegions {
     arrays: Vec<String>,
     /// The name, the labels and the tetrahedra of each.
-    all: Vec<(String, Vec<i64>, u32)>,
+    all: Vec<(String, Vec<i64>, u64)>,
 }
 
 impl PlanRegions {
@@ -166,7 +166,7 @@ impl PlanRegions {
 
     /// The regions, with those of the tetrahedra that are left; none if there are not so many.
     pub fn of_base(&self, left: &[u32]) -> Option<Regions> {
-        let region = |(name, labels, tetrahedra): &(String, Vec<i64>, u32)| RegionInfo {
+        let region = |(name, labels, tetrahedra): &(String, Vec<i64>, u64)| RegionInfo {
             name: name.clone(),
             labels: labels.clone(),
             tetrahedra: *tetrahedra,
@@ -204,7 +204,7 @@ impl Plan {
             lattice: (origin, step, bits),
             sides,
             fields: info.fields.iter().enumerate().map(field).collect(),
-            counts: [info.vertices, info.tetrahedra],
+            counts: (info.vertices, info.tetrahedra),
             displacement_per_error: info.displacement_per_error,
             displacement_edges: config.displacement_edges,
             quantization: info.quantization,
@@ -239,7 +239,8 @@ impl Plan {
 
     /// The points and tetrahedra of the whole.
     pub fn counts(&self) -> [u64; 2] {
-        self.counts.map(u64::from)
+        let (vertices, tetrahedra) = self.counts;
+        [vertices.into(), tetrahedra]
     }
 
     /// What the file is to say of itself, as it was given to [`part`](super::part).
@@ -300,8 +301,8 @@ impl Plan {
             kind: MtKind::HalfEdge,
             lattice: Lattice { origin, step, bits },
             fields: self.fields.iter().map(PlanField::info).collect(),
-            vertices: self.counts[0],
-            tetrahedra: self.counts[1],
+            vertices: self.counts.0,
+            tetrahedra: self.counts.1,
             updates: 0,
             displacement_per_error: self.displacement_per_error,
             quantization: self.quantization,

@@ -59,7 +59,7 @@ pub(crate) fn table(arrays: &[String], labels: Vec<Vec<i64>>, of: &[u32], input:
         }
         name
     };
-    let region = |(labels, tetrahedra): (Vec<i64>, u32)| RegionInfo {
+    let region = |(labels, tetrahedra): (Vec<i64>, u64)| RegionInfo {
         name: distinct(&labels),
         labels,
         tetrahedra,

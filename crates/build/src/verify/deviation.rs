@@ -58,7 +58,7 @@ struct Inside {
 /// Refuses an input of another size than that of the MT.
 pub fn check_counts(info: &MtInfo, input: &TetMesh) -> Result<(), String> {
     let [points, tets] = input.counts();
-    let wanted = [info.vertices, info.tetrahedra].map(u64::from);
+    let wanted = [u64::from(info.vertices), info.tetrahedra];
     if [points, tets] == wanted {
         return Ok(());
     }

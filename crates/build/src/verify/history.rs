@@ -62,7 +62,7 @@ pub fn requests(mt: &impl ApplyUpdates, input: &TetMesh) -> Vec<Query> {
         let need = Need::within(error).inside(Bounds { min: low, max: high });
         all.push(vec![Query::new(&format!("box {low:?} to {high:?}, error {error}"), need)]);
     }
-    let sizes = [mt.base().tets.len() as u64, u64::from(mt.info().tetrahedra)];
+    let sizes = [mt.base().tets.len() as u64, mt.info().tetrahedra];
     all.extend((0..WALKS).map(|i| walk(i, &whole, sizes, &mut numbers)));
     for i in (1..all.len()).rev() {
         all.swap(i, numbers.next() as usize % (i + 1));
@@ -72,7 +72,7 @@ pub fn requests(mt: &impl ApplyUpdates, input: &TetMesh) -> Vec<Query> {
 
 fn values(info: &MtInfo, input: &TetMesh, whole: &Bounds, numbers: &mut Numbers) -> Vec<Query> {
     let mut all = Vec::new();
-    let side = (PART_TETS / f64::from(info.tetrahedra.max(1))).cbrt();
+    let side = (PART_TETS / info.tetrahedra.max(1) as f64).cbrt();
     let each = (VALUES / info.fields.len()).max(2);
     for (f, field) in info.fields.iter().enumerate() {
         let known = input.fields.iter().find(|known| field.is_of(known));

@@ -41,7 +41,7 @@ pub fn of(mt: &impl ApplyUpdates, input: &TetMesh) -> Vec<Query> {
         boxes: boxes(input),
         regions: regions(input),
         views: views(input),
-        sizes: [mt.base().tets.len() as u64, u64::from(mt.info().tetrahedra)],
+        sizes: [mt.base().tets.len() as u64, mt.info().tetrahedra],
     };
     queries.add_uniform();
     queries.add_boxes();

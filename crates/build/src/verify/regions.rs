@@ -62,7 +62,7 @@ pub(super) fn labels_of(input: &TetMesh, arrays: &[String]) -> Result<Vec<Vec<i6
     Ok((0..input.tets.len()).map(|t| arrays.iter().map(|array| array[t]).collect()).collect())
 }
 
-fn count<T: Ord>(all: impl Iterator<Item = T>) -> BTreeMap<T, u32> {
+fn count<T: Ord>(all: impl Iterator<Item = T>) -> BTreeMap<T, u64> {
     let mut counts = BTreeMap::new();
     all.for_each(|one| *counts.entry(one).or_insert(0) += 1);
     counts

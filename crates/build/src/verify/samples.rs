@@ -29,7 +29,7 @@ const VERTICES: usize = 20_000;
 pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec<Query> {
     let whole = bounds(input);
     let mut numbers = Numbers(0x5DEE_CE66_D1CE_4E5B);
-    let part = (BOX_TETS / f64::from(info.tetrahedra.max(1))).min(1.0).cbrt();
+    let part = (BOX_TETS / info.tetrahedra.max(1) as f64).min(1.0).cbrt();
     let mut all = vec![Query::new(&format!("everywhere, error {coarse}"), Request::within(coarse))];
     while all.len() < count {
         let i = all.len();

@@ -192,8 +192,8 @@ fn parts_make_one_mt_that_keeps_every_promise() {
             let built = in_parts(&mesh, &config, parts);
             let summary = built.summary;
             assert_eq!(
-                [summary.vertices, summary.tetrahedra, summary.updates + summary.base_vertices],
-                [whole.vertices, whole.tetrahedra, whole.vertices],
+                (summary.vertices, summary.tetrahedra, summary.updates + summary.base_vertices),
+                (whole.vertices, whole.tetrahedra, whole.vertices),
                 "{name}, {parts}"
             );
             // What was between parts is simplified, too.

@@ -264,7 +264,7 @@ fn parts_that_hang_together_by_faces_are_regions_and_cost_nothing() {
     let names: Vec<&str> = known.all.iter().map(|region| region.name.as_str()).collect();
     assert_eq!((known.arrays.join(","), names), ("components".to_owned(), vec!["1", "2", "3"]));
     // In the order of their first cells: x runs fastest.
-    let counts = [5 * N, 5 * 4, 5 * 7].map(|columns| columns * N * 6);
+    let counts = [5 * N, 5 * 4, 5 * 7].map(|columns| u64::from(columns * N * 6));
     assert_eq!(known.all.iter().map(|region| region.tetrahedra).collect::<Vec<_>>(), counts);
     let steps = [f64::INFINITY, 0.1, 0.01, 0.0].map(|error| {
         let [a, b] = [&plain, &parted].map(|mt| front_for(mt, &Request::within(error)));

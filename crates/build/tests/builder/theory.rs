@@ -134,7 +134,7 @@ fn a_convex_grid_gets_a_small_base_mesh() {
 fn a_larger_budget_is_never_worse() {
     let mesh = generate::bucky(10).expect("a size that is known");
     let mt = built(&mesh).mt;
-    let (least, all) = (mt.base().tets.len() as u32, mt.info().tetrahedra);
+    let (least, all) = (mt.base().tets.len() as u32, mt.info().tetrahedra as u32);
     let mut last = f64::INFINITY;
     for part in 0..=20 {
         let budget = least + (all - least) * part / 20;
