@@ -64,9 +64,11 @@ impl TetMesh {
     pub fn counts(&self) -> [u64; 2] {
         match self.grid {
             Some(Grid { dims, .. }) if self.is_grid_alone() => {
-                let product =
-                    |less: u32| dims.iter().map(|&d| u64::from(d.saturating_sub(less))).product::<u64>();
-                [product(0), 6 * product(1)]
+                let product = |first: u64, less: u32| {
+                    let along = dims.iter().map(|&d| u64::from(d.saturating_sub(less)));
+                    along.fold(first, u64::saturating_mul)
+                };
+                [product(1, 0), product(6, 1)]
             }
             _ => [self.positions.len() as u64, self.tets.len() as u64],
         }

@@ -1,7 +1,7 @@
 //! Why no MT was built, and what to do.
 
 use tetralod::mesh::{InputCell, MeshError};
-use tetralod::mt::{ConvertError, UpdateError};
+use tetralod::mt::{ConvertError, MAX_VERTICES, UpdateError};
 use thiserror::Error;
 
 /// Why no MT was built.
@@ -192,12 +192,20 @@ pub enum BuildError {
     /// The mesh is not convex: insertion fills the convex hull of the points.
     #[error("the mesh does not fill its convex hull, which insertion would do; build by decimation")]
     NotConvex,
-    /// More vertices or tetrahedra than an MT can number.
+    /// More vertices or tetrahedra than a mesh in memory can number.
     #[error(
-        "the mesh has more than 2^30 points, or more tetrahedra than have numbers: 2^30 - 1 in one mesh or part, 2^32 - 1 in all parts; \
-         build it in more parts, or split it"
+        "there are more than 2^30 points or 2^30 - 1 tetrahedra in one mesh or part; build it in more parts, or split it"
     )]
     TooLarge,
+    /// More points than an MT can number.
+    #[error(
+        "{points} points are more than one MT can number, {MAX_VERTICES} (a grid of 1625 x 1625 x 1625 points, or as many of any shape), \
+         however many parts there are; keep fewer samples along each axis, or split the data and build an MT of each piece"
+    )]
+    Points {
+        /// How many there are, as far as they were counted.
+        points: u64,
+    },
     /// The caller stopped the work.
     #[error("stopped")]
     Stopped,
@@ -245,7 +253,7 @@ impl tetralod::Coded for BuildError {
             | Self::TooManyFields { .. }
             | Self::Tolerance { .. }
             | Self::Option { .. } => "bad-option",
-            Self::TooLarge => "limit",
+            Self::TooLarge | Self::Points { .. } => "limit",
             Self::Stopped => "stopped",
             Self::Internal(_) | Self::Convert(_) => "internal",
             _ => "bad-mesh",

@@ -8,9 +8,10 @@ use crate::fields::{check_finite, check_finite_cells};
 use crate::ghosts::HIDDEN_POINT;
 use crate::{cell_types, cells};
 use tetralod::mesh::{CellNumbers, Field, Grid, MAX_TETS, MeshInput, TetMesh, kuhn_tets};
+use tetralod::mt::MAX_VERTICES;
 
-/// Most points of a grid: those that numbers of 32 bits tell apart, some 1600³, where memory has addresses for them.
-pub(super) const MAX_GRID_POINTS: u64 = if usize::BITS < 64 { 1 << 27 } else { u32::MAX as u64 };
+/// Most points of a grid: as many as an MT has vertices, some 1625³, where memory has addresses for them.
+pub(super) const MAX_GRID_POINTS: u64 = if usize::BITS < 64 { 1 << 27 } else { MAX_VERTICES as u64 };
 
 /// First and last index along x, y and z.
 pub(super) type Extent = [i64; 6];
@@ -21,9 +22,8 @@ pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) 
         let what = format!("a grid of {} x {} x {} points", dims[0], dims[1], dims[2]);
         return Err(ReadReason::unsupported(what, "give at least two points along each axis"));
     }
-    let points = dims.iter().try_fold(1_u64, |n, d| n.checked_mul(*d));
-    if points.is_none_or(|n| n > MAX_GRID_POINTS) {
-        return Err(ReadReason::TooLarge { what: "grid points".into(), limit: MAX_GRID_POINTS });
+    if !has_numbers(dims) {
+        return Err(too_many_points(dims));
     }
     let far = [0, 1, 2].map(|i| origin[i] + spacing[i] * dims[i] as f64);
     if far.iter().chain(&origin).any(|x| !x.is_finite()) || spacing.iter().any(|s| s.is_nan() || *s <= 0.0) {
@@ -33,6 +33,27 @@ pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) 
     // Each dimension is at most the number of points.
     Ok(Grid { dims: dims.map(|d| d as u32), origin, spacing })
 }
+
+/// Whether a grid has no more points than may be.
+fn has_numbers(dims: [u64; 3]) -> bool {
+    let points = dims.iter().try_fold(1_u64, |n, d| n.checked_mul(*d));
+    points.is_some_and(|n| n <= MAX_GRID_POINTS)
+}
+
+/// That a grid has too many points, and how coarse it could be.
+fn too_many_points(dims: [u64; 3]) -> ReadReason {
+    let words = |[x, y, z]: [u64; 3]| format!("{x} x {y} x {z}");
+    let coarser = |step: u64| dims.map(|count| count.div_ceil(step));
+    let fits = |dims: [u64; 3]| !dims.contains(&1) && has_numbers(dims);
+    let fitting = (2..=COARSEST).find(|step| fits(coarser(*step)));
+    let instead =
+        fitting.map(|step| format!("; one of {step} along each axis would be {}", words(coarser(step))));
+    let what = format!("grid points (there are {}{})", words(dims), instead.unwrap_or_default());
+    ReadReason::TooLarge { what, limit: MAX_GRID_POINTS }
+}
+
+/// No grid is said to be kept by less than one of so many points along an axis.
+const COARSEST: u64 = 16;
 
 /// Where the points of a grid lie: the first one, and the steps from one to the next along each axis of the grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -298,13 +319,19 @@ mod tests {
         let said = |dims: [u64; 3]| checked_dims(dims).map_err(|error| error.to_string());
         assert_eq!(said([1625, 1625, 1626]), Ok([1625, 1625, 1626]));
         assert_eq!(said([2, 2, (1 << 30) - 1]), Ok([2, 2, (1 << 30) - 1]));
-        for dims in [[4096; 3], [1626; 3], [2, 2, 1 << 30], [u64::MAX; 3], [1 << 32, 1 << 32, 2]] {
-            assert_eq!(
-                said(dims),
-                Err("more than 4294967295 grid points; split the data".into()),
-                "{dims:?}"
-            );
+        assert_eq!(said([2, 3, 715_827_882]), Ok([2, 3, 715_827_882]));
+        let most = "more than 4294967294 grid points";
+        for (dims, there) in [
+            ([4096; 3], "4096 x 4096 x 4096; one of 3 along each axis would be 1366 x 1366 x 1366"),
+            ([1626; 3], "1626 x 1626 x 1626; one of 2 along each axis would be 813 x 813 x 813"),
+            // As many as there are numbers, of which one means none.
+            ([3, 5, 286_331_153], "3 x 5 x 286331153; one of 2 along each axis would be 2 x 3 x 143165577"),
+            ([2, 2, 1 << 30], "2 x 2 x 1073741824"),
+            ([1 << 32, 1 << 32, 2], "4294967296 x 4294967296 x 2"),
+        ] {
+            assert_eq!(said(dims), Err(format!("{most} (there are {there}); split the data")));
         }
+        assert!(said([u64::MAX; 3]).is_err_and(|error| error.starts_with(most)));
         // One mesh has fewer tetrahedra.
         assert_eq!(bytes([513; 3]), Ok(24 * 513_u64.pow(3) + 96 * 512_u64.pow(3)));
         let error = bytes([565; 3]).unwrap_err().to_string();

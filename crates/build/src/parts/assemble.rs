@@ -202,6 +202,11 @@ impl<'a> Listed<'a> {
             scratch.append(UPDATES, &bytes)?;
             nodes.push((node, vertices.len() as u32));
         }
+        // Each inserts a point of its own: so their numbers have 32 bits.
+        let all: u64 = nodes.iter().map(|(_, count)| u64::from(*count)).sum();
+        if all > plan.counts.0.into() {
+            return Err(PartsError::Damaged { what: OTHER_POINTS });
+        }
         Ok(Self { numbers: Numbers::new(&nodes, plan.block_bits), nodes, scratch })
     }
 
@@ -236,6 +241,9 @@ impl<'a> Listed<'a> {
     /// Enters the MT's vertex for each reference vertex, given those of so many base vertices, and sorts the updates by their near vertices. Each
     /// point must be in the base mesh or be inserted, by one update and next to a vertex that is there.
     fn number(&self, number: &mut [u32], base: u32) -> Result<Children<'a>, PartsError> {
+        if u64::from(base) + u64::from(self.len()) > number.len() as u64 {
+            return Err(PartsError::Damaged { what: OTHER_POINTS });
+        }
         self.each(|update, [vertex, _], _| match number.get_mut(vertex as usize) {
             Some(number) if *number == NONE => {
                 *number = base + update;

@@ -9,7 +9,7 @@ pub(super) fn shift(bits: u32) -> u32 {
 }
 
 /// How many tetrahedra of each part are at each place along each axis.
-pub(super) struct Places(Vec<[Vec<u32>; 3]>);
+pub(super) struct Places(Vec<[Vec<u64>; 3]>);
 
 impl Places {
     pub fn of(parts: usize) -> Self {
@@ -29,7 +29,7 @@ impl Places {
 
 /// The longest axis along which tetrahedra can be cut, and the first place behind the cut, given how many there are at each place along each
 /// axis.
-pub(super) fn best_cut(counts: &[Vec<u32>; 3], step: [f64; 3]) -> Option<(usize, usize)> {
+pub(super) fn best_cut(counts: &[Vec<u64>; 3], step: [f64; 3]) -> Option<(usize, usize)> {
     let length = |axis: usize| {
         let mut used = (0..).zip(&counts[axis]).filter(|(_, n)| **n > 0).map(|(x, _)| x);
         let first = used.next().unwrap_or(0_u32);
@@ -41,8 +41,8 @@ pub(super) fn best_cut(counts: &[Vec<u32>; 3], step: [f64; 3]) -> Option<(usize,
 }
 
 /// Where to cut so that both sides have about as many; none if one would have nothing.
-fn half(counts: &[u32]) -> Option<usize> {
-    let all: u64 = counts.iter().map(|&n| u64::from(n)).sum();
+fn half(counts: &[u64]) -> Option<usize> {
+    let all: u64 = counts.iter().sum();
     let mut below = 0_u64;
     let mut best: Option<(u64, usize)> = None;
     for (x, &n) in counts.iter().enumerate() {
@@ -50,7 +50,7 @@ fn half(counts: &[u32]) -> Option<usize> {
         if below > 0 && below < all && best.is_none_or(|(least, _)| off < least) {
             best = Some((off, x));
         }
-        below += u64::from(n);
+        below += n;
     }
     best.map(|(_, x)| x)
 }

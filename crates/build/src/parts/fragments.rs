@@ -9,7 +9,7 @@ use crate::lattice::quantize::Quantized;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use tetralod::geom::{Lattice, PointGrid};
-use tetralod::mesh::{NONE, TetMesh};
+use tetralod::mesh::{MAX_TETS, NONE, TetMesh};
 
 /// What one piece has of a part. Points are places in `points` unless it says otherwise.
 #[derive(Default, Serialize, Deserialize)]
@@ -147,7 +147,7 @@ pub(super) struct Band {
     places: HashMap<u32, u32>,
     values: Vec<Vec<f64>>,
     /// The number in the whole of each tetrahedron, and, once pieces have been sorted in, its part and its number there.
-    tets: Vec<u32>,
+    tets: Vec<u64>,
     ranks: Vec<(u16, u32)>,
 }
 
@@ -174,7 +174,7 @@ impl Band {
 
     /// Takes from a piece, whose first tetrahedron has the number `first`, what a search for these points may look at: tetrahedra whose
     /// bounding boxes touch the way from the point to where the lattice has put it.
-    pub fn add(&mut self, stored: &Stored, lattice: &Lattice, first: u32) {
+    pub fn add(&mut self, stored: &Stored, lattice: &Lattice, first: u64) {
         self.values.resize(stored.values.len(), Vec::new());
         for (t, tet) in (first..).zip(&stored.tets) {
             let mut is_near = false;
@@ -218,7 +218,7 @@ impl Band {
     }
 
     /// Notes the parts of the tetrahedra of a piece, and their numbers there.
-    fn note(&mut self, first: u32, part_of: &[u16], ranks: &[u32]) {
+    fn note(&mut self, first: u64, part_of: &[u16], ranks: &[u32]) {
         let from = self.tets.partition_point(|&t| t < first);
         for (&t, noted) in self.tets[from..].iter().zip(&mut self.ranks[from..]) {
             let Some(&part) = part_of.get((t - first) as usize) else { return };
@@ -237,7 +237,7 @@ pub(super) struct Fragments {
     pieces: Vec<Vec<u32>>,
     /// How many tetrahedra each part has so far, and all together.
     counts: Vec<u32>,
-    all: u32,
+    all: u64,
     /// The faces between parts, those of each part in a row: see `partition::between`.
     pub interface: Vec<(u16, [u32; 3], u16)>,
     of_band: BTreeMap<u16, Fragment>,
@@ -272,8 +272,11 @@ impl Fragments {
         let PieceParts { prepared: Prepared { points, mesh, quantized, .. }, part_of, ends, shortest } =
             piece;
         let ranks = &ranks(part_of, &mut self.counts);
+        if self.counts.iter().any(|&count| count as usize > MAX_TETS) {
+            return Err(BuildError::TooLarge.into());
+        }
         band.note(self.all, part_of, ranks);
-        self.all += part_of.len() as u32;
+        self.all += part_of.len() as u64;
         let values = mesh.fields.iter().map(|field| &field.values[..]).collect();
         let parted = InParts { tets: &mesh.tets, quantized, values, part_of, ends, shortest, ranks };
         parted.each(|v| points[v as usize], &mut |part, fragment| {

@@ -5,7 +5,7 @@
 use super::PartsError;
 use super::cut::{CUT_BITS, best_cut, shift};
 use super::piece::{Carried, Part, Piece};
-use super::plan::{MOST_TETS, Plan, purpose};
+use super::plan::{Plan, purpose};
 use crate::error::points::as_vec;
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use tetralod::geom::{Bounds, Lattice, ON_LATTICE, bits_of};
 use tetralod::mesh::{Extremes, Field, Grid, MAX_TETS, MOST_LABELS, MeshError, TetMesh, kuhn_tets};
-use tetralod::mt::{FieldInfo, MAX_UPDATES, MtInfo, MtKind};
+use tetralod::mt::{FieldInfo, MAX_VERTICES, MtInfo, MtKind};
 
 /// The points in a box of a grid.
 pub type PointBox = [Range<u32>; 3];
@@ -156,8 +156,8 @@ impl<'a> GridCut<'a> {
     ) -> Result<Option<Self>, PartsError> {
         let Some(grid) = mesh.grid else { return Ok(None) };
         let [points, tetrahedra] = mesh.counts();
-        if points > u64::from(MAX_UPDATES) || tetrahedra > MOST_TETS {
-            return Err(BuildError::TooLarge.into());
+        if points > u64::from(MAX_VERTICES) {
+            return Err(BuildError::Points { points }.into());
         }
         if tetrahedra == 0 {
             return Err(BuildError::Empty.into());
@@ -255,9 +255,9 @@ impl<'a> GridCut<'a> {
             let mut halves = Vec::with_capacity(2 * boxes.len());
             for cells in boxes {
                 let counts = [0, 1, 2].map(|axis: usize| {
-                    let others: u32 =
-                        (0..3).filter(|&k| k != axis).map(|k: usize| cells[k].len() as u32).product();
-                    let mut counts = vec![0; 1 << CUT_BITS];
+                    let others: u64 =
+                        (0..3).filter(|&k| k != axis).map(|k: usize| cells[k].len() as u64).product();
+                    let mut counts = vec![0_u64; 1 << CUT_BITS];
                     cells[axis].clone().for_each(|cell| counts[place(cell)] += 6 * others);
                     counts
                 });
@@ -520,37 +520,79 @@ mod tests {
         TetMesh { grid, ..TetMesh::default() }
     }
 
-    #[test]
-    fn a_grid_of_as_many_tetrahedra_as_have_numbers_is_cut() {
-        let mesh = &alone([895, 895, 893]);
-        let config = BuildConfig::default();
+    fn cut_alone<'a>(mesh: &'a TetMesh, read: Option<&'a Known<'a>>) -> GridCut<'a> {
         let grid = mesh.grid.expect("a grid");
-        let lattice = position_lattice::of_grid(&grid, &config).expect("a lattice");
+        let lattice = position_lattice::of_grid(&grid, &BuildConfig::default()).expect("a lattice");
         let spare = ((grid.spacing[0] / lattice.step[0]) as u32).ilog2();
-        let cut = |parts: u32| {
-            let (fields, cuts, kept, boxes) = Default::default();
-            let mut cut = GridCut { grid, lattice, spare, fields, mesh, cuts, kept, boxes, read: None };
-            cut.cut(parts).map(|()| cut)
-        };
-        // Two have too many each.
-        assert!(matches!(cut(2), Err(PartsError::Build(BuildError::TooLarge))));
-        let cut = cut(64).expect("parts");
-        let cells = |cells: &[Range<u32>; 3]| cells.iter().map(|range| range.len() as u64).product::<u64>();
-        let [points, tetrahedra] = mesh.counts();
-        assert_eq!(6 * cut.boxes.iter().map(cells).sum::<u64>(), tetrahedra);
-        assert!(tetrahedra > u64::from(u32::MAX) - (1 << 26) && points < u64::from(MAX_UPDATES));
-        for (part, cells) in (0..).zip(&cut.boxes) {
-            let corners = [cells.clone().map(|range| range.start), cells.clone().map(|range| range.end - 1)];
-            assert_eq!(corners.map(|cell| cut.part_of(cell)), [part; 2]);
+        let (fields, cuts, kept, boxes) = Default::default();
+        GridCut { grid, lattice, spare, fields, mesh, cuts, kept, boxes, read }
+    }
+
+    #[test]
+    fn a_grid_of_as_many_points_as_have_numbers_is_cut() {
+        // As near to a cube as can be, and so flat that few layers have more tetrahedra than have numbers.
+        for (dims, parts) in [([1625, 1625, 1626], 32), ([2, 65_535, 32_767], 16)] {
+            let mesh = &alone(dims);
+            let cut = |parts: u32| {
+                let mut cut = cut_alone(mesh, None);
+                cut.cut(parts).map(|()| cut)
+            };
+            // Half as many have too many each.
+            assert!(matches!(cut(parts / 2), Err(PartsError::Build(BuildError::TooLarge))), "{dims:?}");
+            let cut = cut(parts).expect("parts");
+            let cells =
+                |cells: &[Range<u32>; 3]| cells.iter().map(|range| range.len() as u64).product::<u64>();
+            let [points, tetrahedra] = mesh.counts();
+            assert_eq!(6 * cut.boxes.iter().map(cells).sum::<u64>(), tetrahedra);
+            assert!(tetrahedra > 2 * u64::from(u32::MAX));
+            assert!(
+                (u64::from(MAX_VERTICES) - (1 << 22)..=MAX_VERTICES.into()).contains(&points),
+                "{points}"
+            );
+            for (part, cells) in (0..).zip(&cut.boxes) {
+                let corners =
+                    [cells.clone().map(|range| range.start), cells.clone().map(|range| range.end - 1)];
+                assert_eq!(corners.map(|cell| cut.part_of(cell)), [part; 2]);
+            }
         }
     }
 
     #[test]
+    fn a_part_at_the_end_of_a_grid_has_its_last_points() {
+        let dims = [1625, 1625, 1626];
+        let grid = Grid { dims, origin: [0.0; 3], spacing: [1.0; 3] };
+        let field = Field::new("its number", Vec::new());
+        let mesh = TetMesh { grid: Some(grid), fields: vec![field], ..TetMesh::default() };
+        let [nx, ny, _] = dims.map(u64::from);
+        let number = |[x, y, z]: [u32; 3]| u64::from(x) + nx * (u64::from(y) + ny * u64::from(z));
+        let read = |_: usize, points: PointBox| -> Result<Vec<f64>, PartsError> {
+            Ok(indices(points).map(|index| number(index) as f64).collect())
+        };
+        let values = GridValues { mesh: mesh.clone(), layers: 1, read: &read };
+        let known = Known { of: &values, extremes: vec![None], hashers: vec![crc32fast::Hasher::new()] };
+        let cut = GridCut { fields: vec![&mesh.fields[0]], ..cut_alone(&mesh, Some(&known)) };
+        let piece = cut.piece(1, &dims.map(|n| n - 3..n - 1)).expect("values");
+        assert_eq!((piece.points.len(), piece.tets.len()), (27, 48));
+        assert_eq!(piece.points.last().map(|&last| u64::from(last)), Some(mesh.counts()[0] - 1));
+        assert!(piece.points.is_sorted());
+        assert_eq!(piece.values, piece.points.iter().map(|&point| f64::from(point)).collect::<Vec<_>>());
+        assert_eq!(piece.positions.last(), Some(&cut.position(dims.map(|n| n - 1))));
+    }
+
+    #[test]
     fn more_is_refused_before_anything_else() {
-        for dims in [[1024; 3], [896; 3], [1625; 3], [2, 1 << 15, 1 << 15]] {
+        for dims in [[4096; 3], [1626; 3], [2, 1 << 16, 1 << 15], [3, 5, 286_331_153], [u32::MAX; 3]] {
             let (mesh, config) = (alone(dims), BuildConfig::default());
-            let refused = GridCut::new(&mesh, None, &config, 64);
-            assert!(matches!(refused.err(), Some(PartsError::Build(BuildError::TooLarge))), "{dims:?}");
+            let refused = GridCut::new(&mesh, None, &config, 64).err().expect("too many points");
+            let PartsError::Build(BuildError::Points { points }) = refused else { panic!("{refused}") };
+            assert_eq!(points, mesh.counts()[0]);
+            let said = refused.to_string();
+            let starts =
+                format!("{points} points are more than one MT can number, 4294967294 (a grid of 1625");
+            assert!(
+                said.starts_with(&starts) && said.contains("keep fewer samples along each axis"),
+                "{said}"
+            );
         }
     }
 }

@@ -8,7 +8,7 @@ use super::cut::{Places, shift};
 use super::fragments::{Band, Fragments, PieceParts};
 use super::partition::{between, shared_faces};
 use super::piece::Part;
-use super::plan::{MOST_TETS, Plan, purpose};
+use super::plan::{Plan, purpose};
 use super::prepared::{Prepared, Stored, Whole, places};
 use super::scratch::Scratch;
 use crate::lattice::field_lattice;
@@ -22,7 +22,7 @@ use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use tetralod::geom::{Bounds, Lattice, WIDE_BITS, bits_of};
 use tetralod::mesh::{BitSet, Extremes, FACES, Field, MOST_LABELS, MeshInput, MeshPiece, TetMesh};
-use tetralod::mt::MAX_UPDATES;
+use tetralod::mt::MAX_VERTICES;
 
 /// A mesh that is parted piece by piece.
 pub struct Piecewise<'a> {
@@ -152,8 +152,8 @@ impl<'a> Piecewise<'a> {
         }
         let end = u64::from(first) + new.len() as u64;
         sums.tets += mesh.tets.len() as u64;
-        if end > u64::from(MAX_UPDATES) || sums.tets > MOST_TETS {
-            return Err(BuildError::TooLarge.into());
+        if end > u64::from(MAX_VERTICES) {
+            return Err(BuildError::Points { points: end }.into());
         }
         sums.points = end as u32;
         if mesh.tets.is_empty() {
@@ -366,7 +366,7 @@ impl<'a> Piecewise<'a> {
                 break;
             }
             let stored = self.stored(index)?;
-            let count = stored.tets.len() as u32;
+            let count = stored.tets.len() as u64;
             band.add(&stored, &of.lattice, first);
             first += count;
         }

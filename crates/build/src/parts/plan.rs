@@ -12,9 +12,6 @@ use tetralod::mt::{FieldInfo, MtInfo, MtKind, RegionInfo, Regions};
 /// Most parts of a plan.
 pub const MOST_PARTS: u32 = 4096;
 
-/// Most tetrahedra of all parts: what an MT's file can count.
-pub(super) const MOST_TETS: u64 = u32::MAX as u64;
-
 /// So many parts are joined at a time: halves along each of three axes.
 const JOINED: u32 = 8;
 

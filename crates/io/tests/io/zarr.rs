@@ -566,6 +566,46 @@ fn boxes_are_read_without_the_chunks_beside_them() {
     assert!(said.contains("3-plain.zarr") && said.contains("c/2/1/1"), "{said}");
 }
 
+#[test]
+fn boxes_at_the_end_of_a_grid_of_as_many_samples_as_have_numbers() {
+    const CHUNK: usize = 64;
+    let folder = Folder::new();
+    let large = |shape: [u64; 3]| {
+        let chunks = json!({ "name": "regular", "configuration": { "chunk_shape": [CHUNK; 3] } });
+        changed(
+            version_3(&json!([bytes_codec("little")])),
+            &[("shape", json!(shape)), ("chunk_grid", chunks)],
+        )
+    };
+    // Some 8 GB, of which there is one chunk: the last.
+    folder.write_json("large.zarr/zarr.json", &large([1626, 1625, 1625]));
+    let at = |k: usize| (k % CHUNK + 100 * (k / CHUNK % CHUNK) + 7 * (k / CHUNK / CHUNK)) as u16;
+    let chunk: Vec<u8> = (0..CHUNK.pow(3)).flat_map(|k| at(k).to_le_bytes()).collect();
+    folder.write("large.zarr/c/25/25/25", chunk);
+    let pieces = Pieces::open_ranges(&folder.path("large.zarr"), &ReadOptions::default(), None);
+    let pieces = pieces.expect("it can be read").expect("in parts");
+    let counts = pieces.counts().expect("counts");
+    assert_eq!([counts.points, counts.tetrahedra], [1625 * 1625 * 1626, 6 * 1624 * 1624 * 1625]);
+    let grid = pieces.grid().expect("a grid");
+    for range in [[1622..1625, 1600..1603, 1623..1626], [1598..1602, 1624..1625, 1599..1601]] {
+        let values = grid.values(0, range.clone()).expect("a box");
+        let [xs, ys, zs] = range;
+        let expected = |[x, y, z]: [u32; 3]| match [x, y, z].map(|k| k.checked_sub(1600)) {
+            [Some(x), Some(y), Some(z)] => f64::from(x + 100 * y + 7 * z),
+            _ => 7.0,
+        };
+        let row = |y: u32, z: u32| xs.clone().map(move |x| expected([x, y, z]));
+        let all = zs.flat_map(|z| ys.clone().flat_map(move |y| row(y, z)).collect::<Vec<_>>());
+        assert_eq!(values, all.collect::<Vec<_>>());
+    }
+    // More have no numbers.
+    folder.write_json("larger.zarr/zarr.json", &large([4096; 3]));
+    let refused = Pieces::open_ranges(&folder.path("larger.zarr"), &ReadOptions::default(), None);
+    let said = refused.err().expect("too many samples").to_string();
+    let words = "more than 4294967294 grid points (there are 4096 x 4096 x 4096; one of 3 along each axis would be 1366 x 1366 x 1366)";
+    assert!(said.contains("larger.zarr") && said.contains(words), "{said}");
+}
+
 /// The parts of a volume, as bytes: of all values, and of values that are read for each part.
 fn parts_of(path: &Path, config: &BuildConfig, count: u32) -> [Result<Vec<Vec<u8>>, String>; 2] {
     let collect = |part: Parting<'_>| {
