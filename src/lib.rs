@@ -35,7 +35,7 @@
 //! // Within 1 % of the field's range at every vertex of the reference mesh.
 //! let stats = session.refine(&Request::within(0.01))?;
 //! assert!(stats.satisfied && stats.error_bound <= 0.01);
-//! assert!(early.tetrahedra < stats.tetrahedra && stats.tetrahedra < built.summary.tetrahedra);
+//! assert!(early.tetrahedra < stats.tetrahedra && u64::from(stats.tetrahedra) < built.summary.tetrahedra);
 //!
 //! // Arrays: positions, one field value per vertex, tetrahedra and their neighbours; and the isosurface at 0.5.
 //! assert_eq!(session.view().tets.len() as u32, stats.tetrahedra);

@@ -89,9 +89,7 @@ pub use info::{FieldInfo, MtInfo, MtKind};
 #[doc(hidden)]
 pub use margins::{Excess, Margins};
 #[doc(hidden)]
-#[doc(hidden)]
-pub use mesh::base::MAX_VERTICES;
-pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
+pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES, MAX_VERTICES};
 #[doc(hidden)]
 pub use mesh::current::mix;
 pub use mesh::current::{CurrentMesh, MeshChanges};

@@ -8,7 +8,6 @@
 //! Guarantees: after every operation [`CurrentMesh::check`] holds. Positions and field levels are integers, so the
 //! mesh depends on the set of applied updates alone, not on their order or on the platform.
 
-use super::FIRST_ANONYMOUS_TAG;
 use super::base::{BaseMesh, BaseMeshError};
 use super::paged_array::PagedArray;
 use super::side_slots::SideSlots;
@@ -18,6 +17,9 @@ use crate::mt::{MtInfo, VertexId};
 use std::any::Any;
 use std::fmt;
 use std::ops::Range;
+
+/// Tags from here on are not looked for, unless a kind of MT says [otherwise](CurrentMesh::look_for_all_tags).
+pub(crate) const FIRST_ANONYMOUS_TAG: u32 = 1 << 31;
 
 /// What a kind of MT keeps with a mesh that its updates are applied to: scratch space, and memory of what was done.
 pub(in crate::mt) trait KindState: Any + Copied + Send + Sync {

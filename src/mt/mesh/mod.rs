@@ -10,6 +10,6 @@ pub(super) mod stars;
 mod tags;
 pub(super) mod tet;
 
+pub(super) use current::FIRST_ANONYMOUS_TAG;
 pub(super) use current::{CurrentMesh, KindState};
 pub(super) use stars::Gather;
-pub(super) use tags::FIRST_ANONYMOUS_TAG;

@@ -3,9 +3,6 @@
 use super::current::CurrentMesh;
 use crate::mesh::NONE;
 
-/// Tags from here on are not looked for, unless a kind of MT says [otherwise](CurrentMesh::look_for_all_tags).
-pub(crate) const FIRST_ANONYMOUS_TAG: u32 = 1 << 31;
-
 impl CurrentMesh {
     /// Gives every tetrahedron a tag: `tags` says which.
     pub(crate) fn tag_all(&mut self, tags: impl IntoIterator<Item = u32>) {
@@ -53,7 +50,7 @@ impl CurrentMesh {
         self.tags[t as usize]
     }
 
-    /// Gives tetrahedron `t` a tag. Those of at least [`FIRST_ANONYMOUS_TAG`] are, by default, not looked for by
+    /// Gives tetrahedron `t` a tag. Those of at least [`FIRST_ANONYMOUS_TAG`](super::current::FIRST_ANONYMOUS_TAG) are, by default, not looked for by
     /// [`CurrentMesh::tagged`].
     #[inline]
     pub(crate) fn set_tag(&mut self, t: u32, tag: u32) {
@@ -79,7 +76,7 @@ impl CurrentMesh {
         self.place_tag(t);
     }
 
-    /// Gives tetrahedron `t` a tag that is not looked for, although it is below [`FIRST_ANONYMOUS_TAG`], in the place of one that is
+    /// Gives tetrahedron `t` a tag that is not looked for, although it is below [`FIRST_ANONYMOUS_TAG`](super::current::FIRST_ANONYMOUS_TAG), in the place of one that is
     /// not.
     #[inline]
     pub(in crate::mt) fn take_tag(&mut self, t: u32, tag: u32) {
@@ -124,6 +121,7 @@ impl CurrentMesh {
 mod tests {
     use super::super::stars::tests::wheel;
     use super::*;
+    use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 
     #[test]
     fn half_edge_mts_have_tags_for_all_updates() {

@@ -571,7 +571,8 @@ fn boxes_at_the_end_of_a_grid_of_as_many_samples_as_have_numbers() {
     const CHUNK: usize = 64;
     let folder = Folder::new();
     let large = |shape: [u64; 3]| {
-        let chunks = json!({ "name": "regular", "configuration": { "chunk_shape": [CHUNK; 3] } });
+        let chunk = [CHUNK; 3];
+        let chunks = json!({ "name": "regular", "configuration": { "chunk_shape": chunk } });
         changed(
             version_3(&json!([bytes_codec("little")])),
             &[("shape", json!(shape)), ("chunk_grid", chunks)],
@@ -601,7 +602,7 @@ fn boxes_at_the_end_of_a_grid_of_as_many_samples_as_have_numbers() {
     // More have no numbers.
     folder.write_json("larger.zarr/zarr.json", &large([4096; 3]));
     let refused = Pieces::open_ranges(&folder.path("larger.zarr"), &ReadOptions::default(), None);
-    let said = refused.err().expect("too many samples").to_string();
+    let said = refused.expect_err("too many samples").to_string();
     let words = "more than 4294967294 grid points (there are 4096 x 4096 x 4096; one of 3 along each axis would be 1366 x 1366 x 1366)";
     assert!(said.contains("larger.zarr") && said.contains(words), "{said}");
 }
