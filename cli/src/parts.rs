@@ -106,7 +106,7 @@ impl Folder<'_> {
         }
         // Beside the parts, and gone afterwards.
         files::in_folder_beside(&self.0.join("pieces"), |folder| {
-            let scratch = ScratchFolder(folder);
+            let scratch = ScratchFolder::new(folder);
             let part = || -> Result<Plan> {
                 let mut parting = Piecewise::new(config, count, &scratch)?;
                 input.pieces.for_each::<anyhow::Error>(&mut |mut piece| {
@@ -165,7 +165,7 @@ impl Folder<'_> {
         read(&self.parted(0), "`tetralod part`", |file| Plan::read(file))
     }
 
-    fn keep_parted(&self, part: &Part) -> Result<(), PartsError> {
+    fn keep_parted(&self, part: &Part<'_>) -> Result<(), PartsError> {
         let write = |out: &mut dyn std::io::Write| Ok(part.write(out)?);
         files::write_file(&self.parted(part.node().index), |out| write(out)).map_err(PartsError::other)
     }
@@ -178,19 +178,32 @@ impl Folder<'_> {
 
     /// Builds a part.
     fn build(&self, index: u32, progress: OnProgress<'_>) -> Result<Step> {
-        let part = self.read(&self.parted(index), "`tetralod part`")?;
-        let before = part.tetrahedra();
-        self.keep(before, parts::build_part(part, progress).map_err(said)?)
+        self.with_scratch(Node { level: 0, index }, |scratch| {
+            let part = self.read(&self.parted(index), "`tetralod part`", scratch)?;
+            let before = part.tetrahedra();
+            self.keep(before, parts::build_part(part, scratch, progress).map_err(said)?)
+        })
     }
 
     /// Joins the parts of a node.
     fn join(&self, node: Node, plan: &Plan, progress: OnProgress<'_>) -> Result<Step> {
-        let mut left = Vec::new();
-        for child in plan.children(node).map_err(said)? {
-            left.push(self.read(&self.built(child), &command_for(child, plan))?);
-        }
-        let before = left.iter().map(Part::tetrahedra).sum();
-        self.keep(before, parts::join(node, left, progress).map_err(said)?)
+        self.with_scratch(node, |scratch| {
+            let mut left = Vec::new();
+            for child in plan.children(node).map_err(said)? {
+                left.push(self.read(&self.built(child), &command_for(child, plan), scratch)?);
+            }
+            let before = left.iter().map(Part::tetrahedra).sum();
+            self.keep(before, parts::join(node, left, scratch, progress).map_err(said)?)
+        })
+    }
+
+    /// Makes a node with a folder beside it for what is not kept in memory.
+    fn with_scratch(
+        &self,
+        node: Node,
+        make: impl FnOnce(&ScratchFolder<'_>) -> Result<Step>,
+    ) -> Result<Step> {
+        files::in_folder_beside(&self.built(node), |folder| make(&ScratchFolder::new(folder)))
     }
 
     /// Builds or joins all nodes of a level, some of them at a time, each by one thread; a node that is alone, by all.
@@ -246,7 +259,7 @@ impl Folder<'_> {
         failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
     }
 
-    fn keep(&self, before: usize, (part, updates): (Part, PartUpdates)) -> Result<Step> {
+    fn keep(&self, before: usize, (part, updates): (Part<'_>, PartUpdates)) -> Result<Step> {
         let path = self.built(part.node());
         files::write_file(&path, |out| Ok(part.write_built(&updates, out)?))?;
         Ok(Step {
@@ -270,11 +283,7 @@ impl Folder<'_> {
         };
         let left = |node: Node| {
             let path = self.built(node);
-            let part = match plan.keeps_exact_values() {
-                true => Part::read::<BufReader<File>>,
-                false => Part::read_mesh,
-            };
-            read(&path, &command_for(node, plan), part).map_err(PartsError::other)
+            read(&path, &command_for(node, plan), Part::read_mesh).map_err(PartsError::other)
         };
         if plan.keeps_exact_values() {
             // They are compared with the whole MT.
@@ -288,7 +297,7 @@ impl Folder<'_> {
             let mut shelf = BlockFiles::new(folder);
             let mut encoder = BlockEncoder::new(&mut shelf);
             let take = &mut |builder: &mut _| encoder.take_blocks(builder).map_err(PartsError::other);
-            let scratch = ScratchFolder(folder);
+            let scratch = ScratchFolder::new(folder);
             let made = with_progress(verbosity, |progress| {
                 parts::assemble_blocks(plan, (&left, &updates), &scratch, take, progress)
             });
@@ -306,8 +315,8 @@ impl Folder<'_> {
         })
     }
 
-    fn read(&self, path: &Path, made_by: &str) -> Result<Part> {
-        read(path, made_by, Part::read)
+    fn read<'s>(&self, path: &Path, made_by: &str, scratch: &'s ScratchFolder<'_>) -> Result<Part<'s>> {
+        read(path, made_by, |file| Part::read(file, scratch))
     }
 
     /// The plan, as any of the parts has it: this one.

@@ -2,34 +2,72 @@
 //! more.
 
 use super::files;
+use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use tetralod::format::BlockShelf;
 use tetralod_build::parts::Scratch;
 
 /// A folder of such files, by their names.
-pub struct ScratchFolder<'a>(pub &'a Path);
+pub struct ScratchFolder<'a> {
+    folder: &'a Path,
+    /// The files that were written at places: what lies there is read bit by bit.
+    open: RwLock<BTreeMap<String, File>>,
+}
+
+impl<'a> ScratchFolder<'a> {
+    /// Of the files in this folder.
+    pub fn new(folder: &'a Path) -> Self {
+        Self { folder, open: RwLock::default() }
+    }
+
+    fn open(&self) -> RwLockReadGuard<'_, BTreeMap<String, File>> {
+        self.open.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change(&self) -> RwLockWriteGuard<'_, BTreeMap<String, File>> {
+        self.open.write().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 impl Scratch for ScratchFolder<'_> {
     fn write(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
-        files::uninterrupted(|| fs::write(self.0.join(name), bytes))
+        files::uninterrupted(|| fs::write(self.folder.join(name), bytes))
     }
 
     fn append(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
-        append(&self.0.join(name), bytes)
+        append(&self.folder.join(name), bytes)
+    }
+
+    fn write_at(&self, name: &str, at: u64, bytes: &[u8]) -> io::Result<()> {
+        let mut open = self.change();
+        if !open.contains_key(name) {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create(true).truncate(false);
+            let file = files::uninterrupted(|| options.open(self.folder.join(name)))?;
+            open.insert(name.to_owned(), file);
+        }
+        let mut file = open.get(name).ok_or(io::ErrorKind::NotFound)?;
+        file.seek(SeekFrom::Start(at))?;
+        files::uninterrupted(|| file.write_all(bytes))
     }
 
     fn read(&self, name: &str) -> io::Result<Vec<u8>> {
-        fs::read(self.0.join(name))
+        fs::read(self.folder.join(name))
     }
 
-    fn read_at(&self, name: &str, at: u64, len: usize) -> io::Result<Vec<u8>> {
-        read_at(&self.0.join(name), at, len)
+    fn read_at(&self, name: &str, at: u64, bytes: &mut [u8]) -> io::Result<()> {
+        match self.open().get(name) {
+            Some(file) => read_at(file, at, bytes),
+            None => read_at(&File::open(self.folder.join(name))?, at, bytes),
+        }
     }
 
     fn remove(&self, name: &str) -> io::Result<()> {
-        fs::remove_file(self.0.join(name))
+        self.change().remove(name);
+        fs::remove_file(self.folder.join(name))
     }
 }
 
@@ -37,12 +75,22 @@ fn append(path: &Path, bytes: &[u8]) -> io::Result<()> {
     files::uninterrupted(|| OpenOptions::new().append(true).create(true).open(path)?.write_all(bytes))
 }
 
-fn read_at(path: &Path, at: u64, len: usize) -> io::Result<Vec<u8>> {
-    let mut file = File::open(path)?;
-    file.seek(SeekFrom::Start(at))?;
-    let mut bytes = Vec::with_capacity(len);
-    file.take(len as u64).read_to_end(&mut bytes)?;
-    if bytes.len() == len { Ok(bytes) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+/// Several threads may read at a time.
+#[cfg(unix)]
+fn read_at(file: &File, at: u64, bytes: &mut [u8]) -> io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, bytes, at)
+}
+
+/// Several threads may read at a time: each read has its place.
+#[cfg(windows)]
+fn read_at(file: &File, mut at: u64, mut bytes: &mut [u8]) -> io::Result<()> {
+    while !bytes.is_empty() {
+        match std::os::windows::fs::FileExt::seek_read(file, bytes, at)? {
+            0 => return Err(io::ErrorKind::UnexpectedEof.into()),
+            read => (bytes, at) = (&mut std::mem::take(&mut bytes)[read..], at + read as u64),
+        }
+    }
+    Ok(())
 }
 
 /// Blocks of an MT file that is written while the MT is made: two files, of blocks that were put there once, and twice.
@@ -76,7 +124,11 @@ impl BlockShelf for BlockFiles {
 
     fn get(&self, block: u32) -> io::Result<Vec<u8>> {
         match self.places.get(block as usize) {
-            Some(&Some((file, at, len))) => read_at(&self.paths[file], at, len),
+            Some(&Some((file, at, len))) => {
+                let mut bytes = vec![0; len];
+                read_at(&File::open(&self.paths[file])?, at, &mut bytes)?;
+                Ok(bytes)
+            }
             _ => Err(io::ErrorKind::NotFound.into()),
         }
     }

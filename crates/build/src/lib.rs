@@ -50,6 +50,7 @@ mod progress;
 mod remedy;
 mod restrict;
 mod result;
+mod scratch;
 pub mod verify;
 mod vertex;
 

@@ -47,27 +47,33 @@ pub fn memory_needed_in_pieces(
 /// The most that sorting takes that goes through files.
 const SORTED: u64 = 16 << 20;
 
+/// The most that a join has in memory of points in buckets.
+const IN_BLOCKS: u64 = 16 << 20;
+
 /// What the steps after parting take.
 fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
     let of_points = |bytes: u64| points.saturating_mul(bytes);
     let of_tets = |bytes: u64| tetrahedra.saturating_mul(bytes);
     let whole = of_tets(150).saturating_add(of_points(120 * fields.saturating_sub(1)));
     let part = whole / u64::from(parts.max(1)) * u64::from(at_a_time);
-    // What is left of the children is an eighth of their tetrahedra, with all of their points. But more stay where parts meet: at both sides of
-    // planes across a grid, two triangles for each square.
+    // What is left of the children is an eighth of their tetrahedra; of points, few are in memory. But more stay where parts meet: at both sides
+    // of planes across a grid, two triangles for each square.
     let side = libm::cbrt(points as f64);
     let left = |planes: f64| {
         let at_interfaces = (4.0 * planes * side * side) as u64;
         at_interfaces.saturating_mul(LEFT_AT_INTERFACE as u64).max(tetrahedra / 8).min(tetrahedra)
     };
-    let joining = |planes: f64| left(planes).saturating_mul(45).saturating_add(of_points(100 + 24 * fields));
-    let last = joining(6.0);
+    let joining = |planes: f64| left(planes).saturating_mul(132 + 8 * fields);
+    // Each point has a record, in blocks of which half may be out of use.
+    let in_blocks = of_points(2 * (25 + 8 * fields)).min(IN_BLOCKS);
+    let last = joining(3.0).saturating_add(in_blocks);
     let assembling = left(6.0).saturating_mul(60).saturating_add(of_points(24 + 6 * fields));
     let assembling = assembling.saturating_add(of_points(20).min(SORTED));
     // Of what has been freed, allocators keep some for each thread. One step alone is done by the thread that assembles.
     let joins = parts.div_ceil(8);
     let first = joining(3.0 * (libm::cbrt(parts.into()) - 1.0));
-    let side_by_side = if joins > 1 { first / u64::from(joins) * u64::from(at_a_time.min(joins)) } else { 0 };
+    let at_a_time_then = u64::from(at_a_time.min(joins));
+    let side_by_side = if joins > 1 { (first / u64::from(joins) + in_blocks) * at_a_time_then } else { 0 };
     let kept = if at_a_time > 1 { part.max(side_by_side) / 2 } else { 0 };
     part.max(last.max(assembling).saturating_add(kept))
 }
@@ -104,7 +110,7 @@ mod tests {
     #[test]
     fn what_threads_have_taken_counts_after_them() {
         // What one process takes for a grid of 65³ points, two parts at a time, of which glibc keeps some of what is free.
-        for (parts, measured) in [(2, 138_000_000), (4, 110_000_000), (8, 95_000_000), (16, 97_000_000)] {
+        for (parts, measured) in [(2, 159_000_000), (4, 92_000_000), (8, 97_000_000), (16, 103_000_000)] {
             let needed = memory_needed_in_parts([274_625, 1_572_864, 1], parts, 2);
             assert!(needed > measured, "{parts} parts: {needed}");
         }

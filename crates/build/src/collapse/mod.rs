@@ -6,9 +6,10 @@ use crate::change::collapse_check::{CheckedCollapse, Refusal, VertexMarks};
 use crate::change::work_mesh::WorkMesh;
 use crate::collapse::history::Collapse;
 use crate::decimate::candidate_queue::{CandidateQueue, Key, Levels};
+use crate::error::buckets::Buckets;
 use crate::error::cost::{Evaluator, Input, VertexData, largest};
 use crate::error::points::squared_length;
-use crate::error::reference::{Buckets, Reference};
+use crate::error::reference::Reference;
 use crate::geometry::dihedral::LeastAngle;
 use crate::geometry::flat::Feature;
 use crate::lattice::field_selection;
@@ -73,7 +74,7 @@ struct Builder<'a> {
     gradients: Vec<glam::DVec3>,
     reference: Reference<'a>,
     frozen: Vec<bool>,
-    buckets: Buckets,
+    buckets: Buckets<'a>,
     marks: VertexMarks,
     /// Counts the changes around each vertex.
     versions: Vec<u32>,

@@ -166,8 +166,8 @@ fn take_tets(mesh: &mut Cow<'_, TetMesh>, config: &BuildConfig) -> Vec<[u32; 4]>
     }
 }
 
-pub(crate) struct Decimator<'a, R: ?Sized> {
-    pub state: State<'a>,
+pub(crate) struct Decimator<'a, 's, R: ?Sized> {
+    pub state: State<'a, 's>,
     rounds: Rounds,
     searches: Searches,
     slots: Vec<u32>,
@@ -185,8 +185,8 @@ struct Prospect {
     end: u32,
 }
 
-impl<'a, R: Record + ?Sized> Decimator<'a, R> {
-    pub fn new(state: State<'a>, gift_wrap: Option<GiftWrap>, record: &'a mut R) -> Self {
+impl<'a, 's, R: Record + ?Sized> Decimator<'a, 's, R> {
+    pub fn new(state: State<'a, 's>, gift_wrap: Option<GiftWrap>, record: &'a mut R) -> Self {
         let points = state.versions.len();
         let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
         let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
@@ -215,7 +215,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
     }
 
     /// Ends the record, and returns what is left.
-    pub fn finish(self) -> State<'a> {
+    pub fn finish(self) -> State<'a, 's> {
         self.record.finish(&self.state.mesh.tets, &self.state.removals.makers);
         self.state
     }
@@ -228,6 +228,11 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
             keep(&mut removals.makers, &live);
             restrictions.renumber(&live);
             self.record.renumber(&live);
+        }
+        if let Some(stored) = &mut buckets.stored {
+            // Searches have few of them in memory.
+            stored.tidy();
+            return;
         }
         let of_a_tet = self.state.reference.points / self.state.mesh.live().max(1);
         self.searches.limit((USUAL_HOLE * of_a_tet) as usize);
@@ -325,7 +330,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
     /// Carries out the `i`-th of the prepared removals.
     fn remove(&mut self, i: usize) {
         let Self { state, searches, rounds, slots, record, .. } = self;
-        let RemovalSearch { hole, best, best_end, regions, .. } = &mut searches.ahead[i];
+        let RemovalSearch { hole, hole_cost, best, best_end, regions, .. } = &mut searches.ahead[i];
         let (hole, end) = (&*hole, *best_end);
         let State { mesh, removals, degrees, reference, reaches, restrictions, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
@@ -351,7 +356,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         removals.errors.extend(errors);
         slots.iter().for_each(|&t| removals.makers[t as usize] = removal);
         let input = Input { hole, filling: &best.filling, reference, regions: &best.regions };
-        best.cost.move_points(&mut state.buckets, slots, input);
+        best.cost.move_points(&mut hole_cost.stored, &mut state.buckets, slots, input);
         let star = hole.faces.iter().flat_map(|(face, _)| face);
         star.for_each(|&v| degrees[v as usize] -= 1);
         degrees[hole.a as usize] -= hole.star.len() as u32;

@@ -8,32 +8,33 @@ use crate::change::hole::{Filling, Hole};
 use crate::change::sides::{FaceSet, bits};
 use crate::change::work_mesh::WorkMesh;
 use crate::decimate::candidate_queue::{Key, Levels};
+use crate::error::buckets::Buckets;
 use crate::error::centre::{Centre, Seat};
 use crate::error::cost::largest;
 use crate::error::fill_cost::{FillCost, HoleCost, Input, Removals};
 use crate::error::points::squared_length;
-use crate::error::reference::{Buckets, Reference};
+use crate::error::reference::Reference;
 use crate::order::reach;
 use crate::order::reach::{Reach, Ruler};
 use crate::restrict::restrictions::Restrictions;
 use tetralod::mesh::NONE;
 
 /// What removals leave besides the mesh.
-pub(crate) struct History {
-    pub buckets: Buckets,
+pub(crate) struct History<'s> {
+    pub buckets: Buckets<'s>,
     pub removals: Removals,
     /// See [`State::reaches`].
     pub reaches: Vec<Reach>,
 }
 
 /// What the evaluation of a candidate reads.
-pub(crate) struct State<'a> {
+pub(crate) struct State<'a, 's> {
     pub mesh: WorkMesh,
     pub reference: Reference<'a>,
     pub frozen: Vec<bool>,
     /// Vertices that belong to a part of the domain that is built elsewhere, too: their stars are not all here. Empty where there is none.
     pub open: Vec<bool>,
-    pub buckets: Buckets,
+    pub buckets: Buckets<'s>,
     pub removals: Removals,
     /// Counts the changes around each vertex.
     pub versions: Vec<u32>,
@@ -46,7 +47,7 @@ pub(crate) struct State<'a> {
     pub restrictions: Restrictions,
 }
 
-impl<'a> State<'a> {
+impl<'a, 's> State<'a, 's> {
     pub fn new(mesh: WorkMesh, reference: Reference<'a>, frozen: Vec<bool>, levels: Levels) -> Self {
         let quantized = reference.quantized;
         let history = History {
@@ -63,7 +64,7 @@ impl<'a> State<'a> {
         reference: Reference<'a>,
         frozen: Vec<bool>,
         levels: Levels,
-        history: History,
+        history: History<'s>,
     ) -> Self {
         let quantized = reference.quantized;
         let History { buckets, removals, reaches } = history;
@@ -114,7 +115,7 @@ pub(crate) struct RemovalSearch {
     pub hole: Hole,
     /// Where fields jump, the regions of its tetrahedra.
     pub regions: Vec<u32>,
-    hole_cost: HoleCost,
+    pub hole_cost: HoleCost,
     nearby: Nearby,
     around: Around,
     /// Whether the filling that `best` is depends on tetrahedra outside of the hole.
@@ -146,7 +147,7 @@ impl Candidate {
     fn evaluate(
         &mut self,
         (hole, hole_cost): (&Hole, &mut HoleCost),
-        state: &State<'_>,
+        state: &State<'_, '_>,
         limit: f64,
         contraction: (FaceSet, Option<Seat>),
     ) {
@@ -185,7 +186,7 @@ impl RemovalSearch {
     }
 
     /// Evaluates a removal, and gets ready to carry it out. False if its level is above `level` now, or it cannot be made.
-    pub fn prepare(&mut self, state: &State<'_>, key: Key, level: u16) -> bool {
+    pub fn prepare(&mut self, state: &State<'_, '_>, key: Key, level: u16) -> bool {
         let found = self.at(state, key.a, key.b, level);
         let is_due = found.is_some_and(|found| found.level() <= level);
         if is_due {
@@ -200,7 +201,7 @@ impl RemovalSearch {
     }
 
     /// Whether removals since it was prepared may have changed the result, although they have left the star alone.
-    pub fn is_stale(&self, state: &State<'_>) -> bool {
+    pub fn is_stale(&self, state: &State<'_, '_>) -> bool {
         // What is kept apart, and what the boundary moves over, may be anywhere; the topology depends on the star of the other end.
         state.restrictions.look_beyond_holes()
             || self.looked_around
@@ -210,7 +211,7 @@ impl RemovalSearch {
 
     /// Evaluates the removal of `a`, by moving it to `end` unless that is [`NONE`]. Returns its key; none if it cannot
     /// be removed. If the key's level is above `level`, it is a lower bound; else `best` is the filling to be made.
-    pub fn at(&mut self, state: &State<'_>, a: u32, end: u32, level: u16) -> Option<Key> {
+    pub fn at(&mut self, state: &State<'_, '_>, a: u32, end: u32, level: u16) -> Option<Key> {
         if state.restrictions.keeps(a) {
             return None;
         }
@@ -232,7 +233,7 @@ impl RemovalSearch {
     }
 
     /// Finds the best edge to contract: the one to `known` unless that is [`NONE`]. Its filling becomes `best`.
-    fn find_end(&mut self, state: &State<'_>, known: u32, level: u16) -> Option<Key> {
+    fn find_end(&mut self, state: &State<'_, '_>, known: u32, level: u16) -> Option<Key> {
         self.hole.find_sides();
         self.list_ends(state, known);
         let mut found: Option<Key> = None;
@@ -263,7 +264,7 @@ impl RemovalSearch {
 
     /// Lists the ends to try, those with the least lower bound of their key first: `known` alone unless that is [`NONE`]. Most do not
     /// make positive tetrahedra, and are left out.
-    fn list_ends(&mut self, state: &State<'_>, known: u32) {
+    fn list_ends(&mut self, state: &State<'_, '_>, known: u32) {
         let Self { ends, hole, hole_cost, centre, regions, .. } = self;
         ends.clear();
         let reference = &state.reference;
@@ -288,7 +289,7 @@ impl RemovalSearch {
     }
 
     /// Fills the hole by moving its vertex to link vertex `i`, one of the ends, if that may be.
-    fn contract(&mut self, state: &State<'_>, i: usize) -> bool {
+    fn contract(&mut self, state: &State<'_, '_>, i: usize) -> bool {
         let Self { hole, now, nearby, .. } = self;
         let positions = &state.reference.quantized.positions;
         if !contract(hole, i, &mut now.filling) || hole.tilts_flat(&now.filling, positions) {
@@ -308,7 +309,7 @@ impl RemovalSearch {
     }
 
     /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
-    fn wrap(&mut self, state: &State<'_>, level: u16) -> Option<Key> {
+    fn wrap(&mut self, state: &State<'_, '_>, level: u16) -> Option<Key> {
         let Self { hole, hole_cost, best, gift_wrap, around, looked_around, .. } = self;
         let positions = &state.reference.quantized.positions;
         if !gift_wrap.as_mut()?.fill(hole, positions, &mut best.filling)

@@ -46,7 +46,7 @@ impl Searches {
     }
 
     /// Prepares the removals with these keys, no more than there are searches for. For each whether it is due.
-    pub fn prepare(&mut self, state: &State<'_>, keys: &[Key], level: u16) -> Vec<bool> {
+    pub fn prepare(&mut self, state: &State<'_, '_>, keys: &[Key], level: u16) -> Vec<bool> {
         let prepare = |search: &mut RemovalSearch, &key: &Key| search.prepare(state, key, level);
         let share = (self.ahead.len() / (4 * self.all.len())).max(1);
         threads::map_mut(&mut self.ahead, keys, share, prepare)
@@ -59,7 +59,7 @@ impl Searches {
     }
 
     /// What [`RemovalSearch::at`] finds for each candidate, in their order.
-    pub fn at(&self, state: &State<'_>, candidates: &[Removal], level: u16) -> Vec<Option<Key>> {
+    pub fn at(&self, state: &State<'_, '_>, candidates: &[Removal], level: u16) -> Vec<Option<Key>> {
         let find = |&(vertex, end): &Removal| self.own().at(state, vertex, end, level);
         let of_range = |range: Range<usize>| candidates[range].iter().map(find).collect::<Vec<_>>();
         threads::map(candidates.len(), SHARE, of_range).concat()

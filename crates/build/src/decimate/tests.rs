@@ -640,7 +640,7 @@ fn vertex_based_mts_have_the_updates_of_the_explicit_one() {
 }
 
 /// Removes vertices of a mesh in some rounds. Before each, `look` gets every vertex that may go.
-fn look_in_rounds(mesh: &TetMesh, mut look: impl FnMut(&State<'_>, &mut RemovalSearch, u32)) {
+fn look_in_rounds(mesh: &TetMesh, mut look: impl FnMut(&State<'_, '_>, &mut RemovalSearch, u32)) {
     let quantized = quantize::quantize(mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
     let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
     let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());

@@ -4,7 +4,7 @@
 //! or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from a tetrahedron
 //! that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had the vertex in its
 //! bucket, and the error recorded then bounds what Σ_S has there. A created tetrahedron is also compared with those
-//! that it contains but that are in other buckets ([`crate::error::outside_points`]). The buckets are in [`crate::error::reference`].
+//! that it contains but that are in other buckets ([`crate::error::outside_points`]). The buckets are in [`crate::error::buckets`].
 //!
 //! The boundary is kept track of in both directions. A created vertex is compared with the reference boundary itself:
 //! its distance from the mesh before says nothing, as step after step along chords would fill any hollow. And each
@@ -12,9 +12,10 @@
 
 use crate::change::collapse_check::CheckedCollapse;
 use crate::change::work_mesh::WorkMesh;
+use crate::error::buckets::Buckets;
 use crate::error::placement::{Placement, Replacement};
 use crate::error::points::{SLACK, as_vec, bounds};
-use crate::error::reference::{Buckets, Reference};
+use crate::error::reference::Reference;
 use glam::DVec3;
 use tetralod::geom::orient3d;
 use tetralod::mesh::{FACES, NONE};
@@ -110,7 +111,7 @@ const NO_DISTANCE: f64 = 1e-8;
 
 impl Evaluator {
     /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned.
-    pub fn evaluate(&mut self, buckets: &Buckets, limit: f64, input: Input<'_>) -> f64 {
+    pub fn evaluate(&mut self, buckets: &Buckets<'_>, limit: f64, input: Input<'_>) -> f64 {
         let Input { collapse, reference, .. } = input;
         self.steps = [0.0; 2];
         self.halve_levels(input);
@@ -162,11 +163,11 @@ impl Evaluator {
         let rim = old_border.iter().flatten().map(|&v| input.data.positions[v as usize]);
         let changed = (collapse.on_boundary && !self.flat).then(|| bounds(rim.chain([collapse.position])));
         let candidates = buckets.outside_points.candidates(removed(collapse), changed);
-        error.max(placement.place_foreign(candidates, &new))
+        error.max(placement.place_foreign(candidates.map(|id| (id, id as u32)), &new))
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
-    pub fn move_points(&mut self, buckets: &mut Buckets, input: Input<'_>) {
+    pub fn move_points(&mut self, buckets: &mut Buckets<'_>, input: Input<'_>) {
         let collapse = input.collapse;
         if collapse.on_boundary && self.flat {
             self.place_on_border(buckets, input);
@@ -178,7 +179,7 @@ impl Evaluator {
                 buckets.border.take(tet);
             }
         }
-        self.placement.move_points(buckets, |cell| collapse.stay[cell as usize].0.tet);
+        self.placement.move_points(buckets, input.reference, |cell| collapse.stay[cell as usize].0.tet);
     }
 
     fn halve_levels(&mut self, input: Input<'_>) {
@@ -293,7 +294,7 @@ impl Evaluator {
     }
 
     /// Finds where the reference vertices of the boundary go. Returns the largest error of their distances.
-    fn place_on_border(&mut self, buckets: &Buckets, input: Input<'_>) -> f64 {
+    fn place_on_border(&mut self, buckets: &Buckets<'_>, input: Input<'_>) -> f64 {
         let Input { collapse, reference, .. } = input;
         let ends = [collapse.a, collapse.b].into_iter().filter(|&end| end < reference.points);
         let points = removed(collapse).flat_map(|tet| buckets.border.iter(tet)).chain(ends);

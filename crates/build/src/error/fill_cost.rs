@@ -1,17 +1,23 @@
 //! The exact error of a removal: what the field and the boundary lose when a hole is filled, at every reference vertex
 //! concerned.
 //!
-//! Buckets are those of [`crate::error::reference`]. A removal takes points from tetrahedra that it removes to tetrahedra that it
+//! Buckets are those of [`crate::error::buckets`]. A removal takes points from tetrahedra that it removes to tetrahedra that it
 //! makes; all other tetrahedra keep theirs, and their errors.
 
 use crate::change::hole::{Filling, Hole};
 use crate::change::sides::{FaceSet, rank};
+use crate::error::buckets::Buckets;
 use crate::error::centre::Seat;
 use crate::error::cost::largest;
-use crate::error::placement::{Placement, Replacement};
+use crate::error::hole_points::{HolePoints, Place};
+use crate::error::outside_points::Known;
+use crate::error::placement::{Found, Placement, Replacement};
 use crate::error::points::{SLACK, bounds};
-use crate::error::reference::{Buckets, Reference};
+use crate::error::reference::Reference;
+use crate::error::stored_points::{Extent, SortedPoints, StoredPoint, StoredPoints};
 use glam::DVec3;
+use std::borrow::Borrow;
+use std::ops::ControlFlow;
 use tetralod::mesh::NONE;
 use tetralod::mt::ErrorCode;
 
@@ -36,6 +42,8 @@ pub(crate) struct HoleCost {
     /// The points in the buckets of its tetrahedra and their numbers in the star, once they are [`gathered`](HoleCost::gather). What put
     /// a filling beyond its limit comes first: it is likely to do the same to the next one.
     points: Vec<(u32, u8)>,
+    /// The same where points are stored.
+    pub stored: HolePoints,
     is_gathered: bool,
     /// Scratch space: the removals that it depends on.
     makers: Vec<u32>,
@@ -87,6 +95,10 @@ pub(crate) struct FillCost {
     pub placement: Placement,
     /// Scratch space: for each tetrahedron of the star where to look first for its points.
     hints: Vec<usize>,
+    /// The faces of the hole that the tetrahedra of the filling have.
+    cells: FaceSet,
+    /// Where points are stored, their order.
+    exchanged: Vec<Place>,
     flat: bool,
     /// How far the boundary moves, as an error.
     pub step: f64,
@@ -127,9 +139,13 @@ impl Removals {
 
 impl HoleCost {
     /// Reads the lists of points once for all fillings of a hole.
-    fn gather(&mut self, hole: &Hole, buckets: &Buckets) {
-        if !std::mem::replace(&mut self.is_gathered, true) {
-            buckets.inside.gather(hole.star.iter().map(|s| s.tet), &mut self.points);
+    fn gather(&mut self, hole: &Hole, buckets: &Buckets<'_>) {
+        if std::mem::replace(&mut self.is_gathered, true) {
+            return;
+        }
+        match &buckets.stored {
+            Some(stored) => self.stored.start(hole.star.iter().map(|s| s.tet), stored),
+            None => buckets.inside.gather(hole.star.iter().map(|s| s.tet), &mut self.points),
         }
     }
 }
@@ -146,7 +162,7 @@ impl FillCost {
     pub fn evaluate(
         &mut self,
         hole_cost: &mut HoleCost,
-        buckets: &Buckets,
+        buckets: &Buckets<'_>,
         limit: f64,
         input: Input<'_>,
         (cells, seat): (FaceSet, Option<Seat>),
@@ -179,26 +195,100 @@ impl FillCost {
             }
             placement.raise(chords(filling, reference));
         }
-        let Self { placement, hints, .. } = self;
-        let mut error = largest(&placement.errors);
-        hints.clear();
-        hints.extend((0..hole.star.len()).map(|tet| first_hint(hole, cells, tet)));
+        self.cells = cells;
         hole_cost.gather(hole, buckets);
-        for i in 0..hole_cost.points.len() {
-            let (point, tet) = hole_cost.points[i];
-            let hint = &mut hints[usize::from(tet)];
-            let own;
-            (own, *hint) = placement.place(point, *hint, &input);
-            error = error.max(own);
-            if error > limit {
-                hole_cost.points.swap(0, i);
-                return error;
-            }
-        }
+        let inside = match &buckets.stored {
+            Some(stored) => self.evaluate_stored(&mut hole_cost.stored, stored, limit, input),
+            None => self.evaluate_listed(&mut hole_cost.points, limit, input),
+        };
+        let error = match inside {
+            ControlFlow::Continue(error) => error,
+            ControlFlow::Break(error) => return error,
+        };
+        let placement = &mut self.placement;
         let rim = hole.border.iter().flatten().chain([&hole.a]);
         let changed = (!self.flat).then(|| bounds(rim.map(|&v| positions[v as usize])));
         let candidates = buckets.outside_points.candidates(hole.star.iter().map(|s| s.tet), changed);
-        error.max(placement.place_foreign(candidates, &input))
+        error.max(match &buckets.stored {
+            Some(stored) => {
+                let record = |id| StoredPoint::new(buckets.outside_points.record(id), stored.layout);
+                placement.place_foreign(candidates.map(|id| (id, record(id))), &input)
+            }
+            None => placement.place_foreign(candidates.map(|id| (id, id as u32)), &input),
+        })
+    }
+
+    /// Starts to look for the points of each tetrahedron of the star.
+    fn start_hints(&mut self, hole: &Hole) {
+        self.hints.clear();
+        self.hints.extend((0..hole.star.len()).map(|tet| first_hint(hole, self.cells, tet)));
+    }
+
+    /// The largest error with those at these points, unless it exceeds the limit.
+    fn evaluate_listed(
+        &mut self,
+        points: &mut [(u32, u8)],
+        limit: f64,
+        input: Input<'_>,
+    ) -> ControlFlow<f64, f64> {
+        self.start_hints(input.hole);
+        let mut error = largest(&self.placement.errors);
+        for i in 0..points.len() {
+            let (point, tet) = points[i];
+            let hint = &mut self.hints[usize::from(tet)];
+            let own;
+            (own, *hint) = self.placement.place(point, *hint, &input);
+            error = error.max(own);
+            if error > limit {
+                points.swap(0, i);
+                return ControlFlow::Break(error);
+            }
+        }
+        ControlFlow::Continue(error)
+    }
+
+    /// [`FillCost::evaluate_listed`] where points are stored: it does not note where they go.
+    fn evaluate_stored(
+        &mut self,
+        points: &mut HolePoints,
+        stored: &StoredPoints<'_>,
+        limit: f64,
+        input: Input<'_>,
+    ) -> ControlFlow<f64, f64> {
+        self.exchanged.clone_from(&points.exchanged);
+        let mut error = largest(&self.placement.errors);
+        let tets = input.hole.star.iter().map(|s| s.tet);
+        let found = self.find_stored(points, &mut &*stored, input, |_, _, found| {
+            error = error.max(found.error);
+            if error > limit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        match found {
+            ControlFlow::Break(found) => {
+                points.exchange(found, tets, stored);
+                ControlFlow::Break(error)
+            }
+            ControlFlow::Continue(()) => ControlFlow::Continue(error),
+        }
+    }
+
+    /// Finds where the stored points of a hole belong, in their order, until `visit` breaks off.
+    fn find_stored<'s, S: Borrow<StoredPoints<'s>>>(
+        &mut self,
+        points: &mut HolePoints,
+        stored: &mut S,
+        input: Input<'_>,
+        mut visit: impl FnMut(&mut S, &[u8], Found) -> ControlFlow<()>,
+    ) -> ControlFlow<Place> {
+        self.start_hints(input.hole);
+        let Self { placement, hints, exchanged, .. } = self;
+        let tets = input.hole.star.iter().map(|s| s.tet);
+        let layout = (*stored).borrow().layout;
+        points.visit(tets, stored, exchanged, |stored, tet, record| {
+            let hint = &mut hints[usize::from(tet)];
+            let found = placement.find(StoredPoint::new(record, layout), *hint, &input);
+            *hint = found.cell;
+            visit(stored, record, found)
+        })
     }
 
     /// Compares the field at the removed vertex first: the error is mostly largest there. If the lattice has moved the vertex, it is in a
@@ -229,11 +319,53 @@ impl FillCost {
 
     /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the
     /// new tetrahedra.
-    pub fn move_points(&mut self, buckets: &mut Buckets, slots: &[u32], input: Input<'_>) {
+    pub fn move_points(
+        &mut self,
+        points: &mut HolePoints,
+        buckets: &mut Buckets<'_>,
+        slots: &[u32],
+        input: Input<'_>,
+    ) {
         self.placement.place_on_border(border_points(buckets, input.hole), &input);
+        let stored = self.sort_stored(points, buckets, slots.len(), input);
         let tets = input.hole.star.iter().map(|s| s.tet).chain(slots.iter().copied());
         tets.for_each(|t| buckets.clear(t));
-        self.placement.move_points(buckets, |cell| slots[cell as usize]);
+        if let Some(of_buckets) = &mut buckets.stored {
+            slots.iter().zip(stored).for_each(|(&t, extents)| of_buckets.put(t, extents));
+        }
+        self.placement.move_points(buckets, input.reference, |cell| slots[cell as usize]);
+    }
+
+    /// Stores the points of a hole anew, those of each cell together, and says where they are; nothing where points are not stored.
+    fn sort_stored(
+        &mut self,
+        points: &mut HolePoints,
+        buckets: &mut Buckets<'_>,
+        cells: usize,
+        input: Input<'_>,
+    ) -> Vec<Vec<Extent>> {
+        let Some(stored) = buckets.stored.take() else { return Vec::new() };
+        let layout = stored.layout;
+        let mut sorted = SortedPoints::new(stored, cells);
+        let mut put = |sorted: &mut SortedPoints<'_>, record: &[u8], cell: usize, outside: bool| {
+            sorted.put(record, cell, outside);
+            let point = StoredPoint::new(record, layout);
+            let known = || Known::at(point.own_place()).with(record);
+            buckets.outside_points.set_outside(point.id(), outside, known);
+        };
+        let mut own = Vec::new();
+        for (point, cell, outside) in self.placement.moves() {
+            own.clear();
+            sorted.stored.record(point, input.reference, outside, &mut own);
+            put(&mut sorted, &own, cell, outside);
+        }
+        _ = self.find_stored(points, &mut sorted, input, |sorted, record, found| {
+            put(sorted, record, found.cell, found.outside);
+            ControlFlow::Continue(())
+        });
+        let (stored, extents) = sorted.finish();
+        buckets.stored = Some(stored);
+        extents
     }
 
     /// How far the old boundary is from the new one.
@@ -260,7 +392,7 @@ fn first_hint(hole: &Hole, cells: FaceSet, tet: usize) -> usize {
 }
 
 /// The reference vertices of the boundary at a hole.
-fn border_points(buckets: &Buckets, hole: &Hole) -> impl Iterator<Item = u32> {
+fn border_points(buckets: &Buckets<'_>, hole: &Hole) -> impl Iterator<Item = u32> {
     let own = hole.on_boundary().then_some(hole.a);
     hole.star.iter().flat_map(|s| buckets.border.iter(s.tet)).chain(own)
 }

@@ -1,7 +1,9 @@
 //! Where the points of replaced tetrahedra go, and the errors there: the common part of collapses and removals.
 
-use crate::error::points::{SLACK, barycentric, clamped};
-use crate::error::reference::{Buckets, Reference};
+use crate::error::buckets::Buckets;
+use crate::error::outside_points::Known;
+use crate::error::points::{PointId, SLACK, barycentric, clamped};
+use crate::error::reference::{Reference, ReferencePoint};
 use glam::{DMat3, DVec3};
 use tetralod::geom::nearest_on_triangle;
 
@@ -22,6 +24,16 @@ pub(crate) trait Replacement {
     }
     /// A position in model units, relative to the origin of a cell, in steps of the lattice.
     fn relative(&self, q: DVec3, origin: DVec3) -> DVec3;
+}
+
+/// Where a point belongs.
+#[derive(Clone, Copy)]
+pub(crate) struct Found {
+    pub cell: usize,
+    /// Whether it is outside of the cell.
+    pub outside: bool,
+    /// The error there.
+    pub error: f64,
 }
 
 /// A new tetrahedron: where its points are.
@@ -58,7 +70,7 @@ pub(crate) struct Placement {
     /// For each point its cell, or the complement of its number if the point is outside.
     moves: Vec<(u32, i32)>,
     /// Points of other buckets that are inside: point and cell.
-    foreign: Vec<(u32, u32)>,
+    foreign: Vec<(PointId, u32)>,
     border_moves: Vec<(u32, u32)>,
     /// The error of each field.
     pub errors: Vec<f64>,
@@ -125,10 +137,17 @@ impl Placement {
         self.made[i] = true;
     }
 
-    /// Finds the cell for a point, testing `hint` first. Returns the error there and the cell.
+    /// Finds the cell for a point, testing `hint` first, and notes it. Returns the error there and the cell.
     pub fn place(&mut self, point: u32, hint: usize, new: &impl Replacement) -> (f64, usize) {
+        let Found { cell, outside, error } = self.find(point, hint, new);
+        self.moves.push((point, if outside { !(cell as i32) } else { cell as i32 }));
+        (error, cell)
+    }
+
+    /// Finds the cell for a point, testing `hint` first.
+    pub fn find(&mut self, point: impl ReferencePoint, hint: usize, new: &impl Replacement) -> Found {
         let reference = new.reference();
-        let (mut cell, mut lambda, depth) = self.locate(reference.quantized.places.at(point), hint, new);
+        let (mut cell, mut lambda, depth) = self.locate(point.place(reference), hint, new);
         // The point stays outside of the mesh where no boundary is near, too: it was not in the star from the start.
         let outside = depth < -SLACK;
         let mut displaced = 0.0;
@@ -141,22 +160,22 @@ impl Placement {
             displaced = reference.error_at(point, distance - moved);
             self.raise(displaced);
         }
-        let region = reference.quantized.region(point);
+        let region = point.region(reference);
         if region.is_some() && new.region(cell) != region {
             (cell, lambda) = self.locate_in(point, region, new).unwrap_or((cell, lambda));
         }
-        self.moves.push((point, if outside { !(cell as i32) } else { cell as i32 }));
-        (self.compare(point, cell, lambda, new).max(displaced), cell)
+        let error = self.compare(point, cell, lambda, new).max(displaced);
+        Found { cell, outside, error }
     }
 
     /// The cell of a point's region that contains it, or is least outside of.
     fn locate_in(
         &mut self,
-        point: u32,
+        point: impl ReferencePoint,
         region: Option<u32>,
         new: &impl Replacement,
     ) -> Option<(usize, DVec3)> {
-        let place = new.reference().quantized.places.at(point);
+        let place = point.place(new.reference());
         let cells: Vec<usize> = (0..self.made.len()).filter(|&cell| new.region(cell) == region).collect();
         let mut best: Option<(usize, DVec3, f64)> = None;
         for cell in cells {
@@ -174,14 +193,18 @@ impl Placement {
     }
 
     /// The largest error at those of `points`, which are in other buckets, that the new cells contain.
-    pub fn place_foreign(&mut self, points: impl Iterator<Item = u32>, new: &impl Replacement) -> f64 {
+    pub fn place_foreign<P: ReferencePoint>(
+        &mut self,
+        points: impl Iterator<Item = (PointId, P)>,
+        new: &impl Replacement,
+    ) -> f64 {
         self.foreign.clear();
         let mut error = 0.0_f64;
-        for point in points {
-            let (cell, lambda, depth) = self.locate(new.reference().quantized.places.at(point), 0, new);
-            let region = new.reference().quantized.region(point);
+        for (id, point) in points {
+            let (cell, lambda, depth) = self.locate(point.place(new.reference()), 0, new);
+            let region = point.region(new.reference());
             if depth >= -SLACK && (region.is_none() || region == new.region(cell)) {
-                self.foreign.push((point, cell as u32));
+                self.foreign.push((id, cell as u32));
                 error = error.max(self.compare(point, cell, lambda, new));
             }
         }
@@ -224,17 +247,38 @@ impl Placement {
     }
 
     /// Raises the errors to those at a point with these barycentric coordinates in a cell; returns the largest one.
-    pub fn compare(&mut self, point: u32, cell: usize, lambda: DVec3, new: &impl Replacement) -> f64 {
+    pub fn compare(
+        &mut self,
+        point: impl ReferencePoint,
+        cell: usize,
+        lambda: DVec3,
+        new: &impl Replacement,
+    ) -> f64 {
         let quantized = new.reference().quantized;
-        quantized.deviation(point, clamped(lambda), |f| new.levels(cell, f), &mut self.errors)
+        point.deviation(quantized, clamped(lambda), |f| new.levels(cell, f), &mut self.errors)
     }
 
-    /// Puts the points into the buckets of their new cells; `tets` are the numbers of the cells.
-    pub fn move_points(&self, buckets: &mut Buckets, tets: impl Fn(u32) -> u32) {
-        for &(point, cell) in &self.moves {
+    /// The points whose cells have been noted, their cells, and whether they are outside of them.
+    pub fn moves(&self) -> impl Iterator<Item = (u32, usize, bool)> {
+        self.moves.iter().map(|&(point, cell)| {
             let outside = cell < 0;
-            buckets.inside.put(tets(if outside { !cell } else { cell }.unsigned_abs()), point);
-            buckets.outside_points.set_outside(point, outside);
+            (point, if outside { !cell } else { cell } as usize, outside)
+        })
+    }
+
+    /// Puts the points into the buckets of their new cells, those inside unless they are stored; `tets` are the numbers of the cells.
+    pub fn move_points(
+        &self,
+        buckets: &mut Buckets<'_>,
+        reference: &Reference<'_>,
+        tets: impl Fn(u32) -> u32,
+    ) {
+        if buckets.stored.is_none() {
+            for (point, cell, outside) in self.moves() {
+                buckets.inside.put(tets(cell as u32), point);
+                let known = || Known::at(reference.quantized.places.at(point));
+                buckets.outside_points.set_outside(point.into(), outside, known);
+            }
         }
         self.foreign.iter().for_each(|&(point, cell)| buckets.outside_points.add_foreign(tets(cell), point));
         self.border_moves.iter().for_each(|&(point, cell)| buckets.border.put(tets(cell), point));

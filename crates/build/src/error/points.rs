@@ -3,10 +3,14 @@
 use crate::change::work_mesh::keep;
 use foldhash::HashMap;
 use glam::{DMat3, DVec3};
+use std::hash::Hash;
 use tetralod::mesh::NONE;
 
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face.
 pub(crate) const SLACK: f64 = 1e-9;
+
+/// A reference point among those that are outside: its number, or where points are stored its name in the whole, with its region above.
+pub(crate) type PointId = u64;
 
 /// Disjoint lists of points, one for each tetrahedron.
 pub(crate) struct Lists {
@@ -61,14 +65,14 @@ impl Lists {
     }
 }
 
-/// Lists of points of which few tetrahedra have any: those without take no memory.
+/// Lists of points of which few tetrahedra have any: those without take no memory. Points are numbers, or names in the whole.
 #[derive(Default)]
-pub(crate) struct SparseLists {
-    first: HashMap<u32, u32>,
-    next: HashMap<u32, u32>,
+pub(crate) struct SparseLists<P = u32> {
+    first: HashMap<u32, P>,
+    next: HashMap<P, P>,
 }
 
-impl SparseLists {
+impl<P: Copy + Eq + Hash> SparseLists<P> {
     pub fn take(&mut self, t: u32) {
         self.first.remove(&t);
     }
@@ -79,14 +83,14 @@ impl SparseLists {
         self.first = self.first.iter().filter_map(|(&t, &point)| Some((place(t)?, point))).collect();
     }
 
-    pub fn put(&mut self, t: u32, point: u32) {
+    pub fn put(&mut self, t: u32, point: P) {
         match self.first.insert(t, point) {
             Some(next) => _ = self.next.insert(point, next),
             None => _ = self.next.remove(&point),
         }
     }
 
-    pub fn iter(&self, t: u32) -> impl Iterator<Item = u32> {
+    pub fn iter(&self, t: u32) -> impl Iterator<Item = P> {
         std::iter::successors(self.first.get(&t).copied(), |p| self.next.get(p).copied())
     }
 }

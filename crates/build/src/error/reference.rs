@@ -1,49 +1,57 @@
-//! The reference mesh that errors are measured against: their units, and which tetrahedron has which of its vertices.
+//! The reference mesh that errors are measured against, its points, and the units of errors.
 
 use crate::change::work_mesh::WorkMesh;
 use crate::error::boundary_distance::BoundaryDistance;
-use crate::error::outside_points::OutsidePoints;
-use crate::error::points::{Lists, SparseLists, as_vec};
+use crate::error::points::as_vec;
 use crate::lattice::quantize::Quantized;
 use glam::DVec3;
 use tetralod::mesh::NONE;
 
-/// The reference vertices that belong to each tetrahedron.
-pub(crate) struct Buckets {
-    /// Points of the reference mesh in the tetrahedron.
-    pub inside: Lists,
-    /// Points of the reference boundary near its boundary faces.
-    pub border: SparseLists,
-    /// Points outside of the tetrahedron in whose bucket they are.
-    pub outside_points: OutsidePoints,
+/// A point of the reference mesh: its number, or a record of it.
+pub(crate) trait ReferencePoint: Copy {
+    /// Where it is, in steps of the lattice.
+    fn place(self, reference: &Reference<'_>) -> DVec3;
+    /// Where the lattice has put it.
+    fn rounded(self, reference: &Reference<'_>) -> [i32; 3];
+    /// The square of the shortest edge of the reference mesh there.
+    fn shortest(self, reference: &Reference<'_>) -> f64;
+    /// Its region, where fields jump.
+    fn region(self, reference: &Reference<'_>) -> Option<u32>;
+    /// See [`Quantized::deviation`].
+    fn deviation(
+        self,
+        quantized: &Quantized,
+        lambda: DVec3,
+        corners: impl Fn(usize) -> [i32; 4],
+        errors: &mut [f64],
+    ) -> f64;
 }
 
-impl Buckets {
-    /// Of a mesh with so many tetrahedra.
-    pub fn new(tets: usize, quantized: &Quantized) -> Self {
-        let points = quantized.places.len();
-        let mut inside = Lists::new(tets, points);
-        let mut outside_points = OutsidePoints::new(quantized.places.clone());
-        for location in &quantized.locations {
-            inside.put(location.tet, location.point);
-            outside_points.set_outside(location.point, location.outside);
-        }
-        Self { inside, border: SparseLists::default(), outside_points }
+impl ReferencePoint for u32 {
+    fn place(self, reference: &Reference<'_>) -> DVec3 {
+        reference.quantized.places.at(self)
     }
 
-    /// Keeps the buckets of these tetrahedra, which ascend, under their places as numbers. All others are empty.
-    pub fn renumber(&mut self, live: &[u32]) {
-        self.inside.renumber(live);
-        self.border.renumber(live);
-        self.outside_points.renumber(live);
+    fn rounded(self, reference: &Reference<'_>) -> [i32; 3] {
+        reference.quantized.positions[reference.quantized.vertex(self) as usize]
     }
 
-    /// Empties the buckets of a tetrahedron, which may be a new one.
-    pub fn clear(&mut self, t: u32) {
-        self.inside.reserve(t);
-        self.inside.take(t);
-        self.border.take(t);
-        self.outside_points.clear(t);
+    fn shortest(self, reference: &Reference<'_>) -> f64 {
+        reference.shortest[reference.quantized.vertex(self) as usize]
+    }
+
+    fn region(self, reference: &Reference<'_>) -> Option<u32> {
+        reference.quantized.region(self)
+    }
+
+    fn deviation(
+        self,
+        quantized: &Quantized,
+        lambda: DVec3,
+        corners: impl Fn(usize) -> [i32; 4],
+        errors: &mut [f64],
+    ) -> f64 {
+        quantized.deviation(self, lambda, corners, errors)
     }
 }
 
@@ -78,17 +86,16 @@ impl<'a> Reference<'a> {
         Self { quantized, points: shortest.len() as u32, boundary, shortest, displacement_per_error, edges }
     }
 
-    /// The displacement that counts as an error of 1 at a vertex.
-    fn allowance(&self, vertex: u32) -> f64 {
+    /// The displacement that counts as an error of 1 at a vertex with this square of the shortest edge.
+    fn allowance(&self, shortest: f64) -> f64 {
         // With no displacement allowed any movement is an infinite error.
-        let own = if self.edges > 0.0 { self.edges * self.shortest[vertex as usize].sqrt() } else { 0.0 };
+        let own = if self.edges > 0.0 { self.edges * shortest.sqrt() } else { 0.0 };
         own.min(self.displacement_per_error)
     }
 
     /// What a displacement at a reference vertex counts as.
-    pub fn error_at(&self, point: u32, distance: f64) -> f64 {
-        let vertex = self.quantized.vertex(point);
-        if distance > 0.0 { distance / self.allowance(vertex) } else { 0.0 }
+    pub fn error_at(&self, point: impl ReferencePoint, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.allowance(point.shortest(self)) } else { 0.0 }
     }
 
     /// What a displacement from a triangle of the reference boundary counts as.
@@ -116,7 +123,7 @@ impl<'a> Reference<'a> {
     pub fn allowance_from(&self, triangle: u32) -> f64 {
         self.boundary
             .corners(triangle)
-            .map(|point| self.allowance(point))
+            .map(|point| self.allowance(self.shortest[point as usize]))
             .into_iter()
             .fold(f64::INFINITY, f64::min)
     }
@@ -128,9 +135,9 @@ impl<'a> Reference<'a> {
 
     /// Where a reference vertex is in the input, in model units from the lattice's origin, and how far the lattice has moved it: what
     /// that alone puts outside is no displacement.
-    pub fn place(&self, point: u32) -> (DVec3, f64) {
-        let p = self.quantized.places.at(point) * DVec3::from_array(self.quantized.lattice.step);
-        (p, p.distance(self.position(point)))
+    pub fn place(&self, point: impl ReferencePoint) -> (DVec3, f64) {
+        let p = point.place(self) * DVec3::from_array(self.quantized.lattice.step);
+        (p, p.distance(self.scaled(point.rounded(self))))
     }
 
     /// Where the lattice has put a reference vertex, in model units from the lattice's origin.

@@ -172,10 +172,21 @@ impl Quantized {
         corners: impl Fn(usize) -> [i32; 4],
         errors: &mut [f64],
     ) -> f64 {
+        let exact = &self.exact[point as usize * self.fields.len()..];
+        self.deviation_from(exact.iter().copied(), lambda, corners, errors)
+    }
+
+    /// [`Quantized::deviation`] from the values of a point, as they are in `exact`.
+    pub fn deviation_from(
+        &self,
+        exact: impl Iterator<Item = f64>,
+        lambda: DVec3,
+        corners: impl Fn(usize) -> [i32; 4],
+        errors: &mut [f64],
+    ) -> f64 {
         let own = 1.0 - lambda.element_sum();
         let mut largest = 0.0_f64;
-        let exact = &self.exact[point as usize * self.fields.len()..];
-        for (f, ((field, &exact), most)) in self.fields.iter().zip(exact).zip(errors).enumerate() {
+        for (f, ((field, exact), most)) in self.fields.iter().zip(exact).zip(errors).enumerate() {
             let [w, x, y, z] = corners(f).map(f64::from);
             let value = own * w + lambda.x * x + lambda.y * y + lambda.z * z;
             let exact = if self.is_plain { (exact - field.origin) / field.step } else { exact };

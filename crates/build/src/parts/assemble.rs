@@ -16,10 +16,10 @@ use super::PartsError;
 use super::children::{ChildSorter, Children};
 use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
-use super::scratch::{InMemory, Scratch};
 use crate::decimate::append;
 use crate::lattice::sides::Sides;
 use crate::order::base::number_base;
+use crate::scratch::{InMemory, Scratch};
 use crate::{BuildError, BuildProgress, BuildResult, BuildSummary, OnProgress};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -53,7 +53,7 @@ pub struct Assembled {
 /// If what is given is not of the plan; the errors of `left` and `updates`; if `progress` stops the work.
 pub fn assemble(
     plan: &Plan,
-    left: Of<'_, Part>,
+    left: Of<'_, Part<'_>>,
     updates: Of<'_, PartUpdates>,
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, PartsError> {
@@ -73,7 +73,7 @@ pub fn assemble(
 /// As [`assemble`], and those of `take`.
 pub fn assemble_blocks(
     plan: &Plan,
-    (left, updates): (Of<'_, Part>, Of<'_, PartUpdates>),
+    (left, updates): (Of<'_, Part<'_>>, Of<'_, PartUpdates>),
     scratch: &dyn Scratch,
     take: OnBlocks<'_>,
     progress: OnProgress<'_>,
@@ -86,8 +86,8 @@ pub fn assemble_blocks(
 }
 
 /// What is left of a node, without what only joins need.
-fn piece_of(plan: &Plan, node: Node, left: Of<'_, Part>) -> Result<Piece, PartsError> {
-    let Part { head, mut piece } = left(node)?;
+fn piece_of(plan: &Plan, node: Node, left: Of<'_, Part<'_>>) -> Result<Piece, PartsError> {
+    let Part { head, mut piece, .. } = left(node)?;
     if head.plan != *plan || head.node != node || !head.built {
         return Err(PartsError::OtherPlan);
     }
@@ -225,7 +225,8 @@ impl<'a> Listed<'a> {
             let span = self.numbers.span(node)?;
             for first in (0..count).step_by(AT_A_TIME as usize) {
                 let some = AT_A_TIME.min(count - first);
-                let bytes = self.scratch.read_at(UPDATES, at, LISTED * some as usize)?;
+                let mut bytes = vec![0; LISTED * some as usize];
+                self.scratch.read_at(UPDATES, at, &mut bytes)?;
                 at += bytes.len() as u64;
                 let (words, _) = bytes.as_chunks::<4>();
                 let (rows, _) = words.as_chunks::<{ LISTED / 4 }>();
@@ -349,7 +350,7 @@ impl<'a> Assembly<'a> {
     /// Returns the builder with all updates, and the MT's vertex for each reference vertex.
     fn append_all(
         mut self,
-        (left, updates): (Of<'_, Part>, Of<'_, PartUpdates>),
+        (left, updates): (Of<'_, Part<'_>>, Of<'_, PartUpdates>),
         take: OnBlocks<'_>,
         progress: OnProgress<'_>,
     ) -> Result<(HalfEdgeBuilder, Vec<u32>), PartsError> {
@@ -498,17 +499,20 @@ fn remover(code: RemoverCode, own: Span, earlier: &[u32]) -> u32 {
 }
 
 /// The exact values of the lossless fields.
-fn exact(plan: &Plan, left: Of<'_, Part>, vertices: &[VertexId]) -> Result<Vec<Exact>, PartsError> {
+fn exact(plan: &Plan, left: Of<'_, Part<'_>>, vertices: &[VertexId]) -> Result<Vec<Exact>, PartsError> {
     if !plan.keeps_exact_values() {
         return Ok(Vec::new());
     }
-    let Part { piece: Piece { points, values, .. }, .. } = left(plan.nodes()[0])?;
-    if points.len() != vertices.len() {
-        return Err(PartsError::Damaged { what: "it lacks points" });
-    }
     let fields = plan.fields.len();
+    let mut values = vec![0.0; vertices.len() * fields];
+    for node in plan.nodes().into_iter().filter(|node| node.level == 0) {
+        let Piece { points, values: own, .. } = piece_of(plan, node, left)?;
+        for (&point, own) in points.iter().zip(own.chunks(fields)) {
+            values[point as usize * fields..][..fields].copy_from_slice(own);
+        }
+    }
     let of = |f: usize| {
-        let own = points.iter().map(|&point| vertices[point as usize]);
+        let own = vertices.iter().copied();
         Exact::new(f, own.zip(values.iter().skip(f).step_by(fields).copied()).collect())
     };
     Ok((0..fields).filter(|&f| plan.fields[f].lossless).map(of).collect())

@@ -1,7 +1,7 @@
 //! Which updates insert their vertices beside which vertex, outside of memory: they come in the order of updates, and are asked for by
 //! vertices.
 
-use super::scratch::Scratch;
+use crate::scratch::Scratch;
 use std::io;
 use tetralod::mt::ForestChild;
 
@@ -116,12 +116,12 @@ impl Children<'_> {
         let (mut starts, mut children) = (vec![0], Vec::new());
         for near in vertices.chunk_by(|a, b| b - a <= GAP) {
             let (first, last) = (near[0], near[near.len() - 1]);
-            let bounds =
-                self.scratch.read_at(STARTS, 4 * u64::from(first), 4 * (last - first + 2) as usize)?;
+            let mut bounds = vec![0; 4 * (last - first + 2) as usize];
+            self.scratch.read_at(STARTS, 4 * u64::from(first), &mut bounds)?;
             let bound = |v: u32| number(&bounds, (v - first) as usize);
             let from = bound(first);
-            let len = (bound(last + 1) - from) as usize * CHILD;
-            let rows = self.scratch.read_at(CHILDREN, CHILD as u64 * u64::from(from), len)?;
+            let mut rows = vec![0; (bound(last + 1) - from) as usize * CHILD];
+            self.scratch.read_at(CHILDREN, CHILD as u64 * u64::from(from), &mut rows)?;
             for &v in near {
                 let own = [v, v + 1].map(|v| (bound(v) - from) as usize * CHILD);
                 children.extend(rows[own[0]..own[1]].chunks_exact(CHILD).map(child));
@@ -140,8 +140,8 @@ impl Children<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::scratch::InMemory;
     use super::*;
+    use crate::scratch::InMemory;
 
     #[test]
     fn children_come_back_by_vertices() {

@@ -52,7 +52,7 @@ pub fn part_grid(
     config: &BuildConfig,
     parts: u32,
     metadata: BTreeMap<String, String>,
-    put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
+    put: &mut dyn FnMut(Part<'static>) -> Result<(), PartsError>,
 ) -> Result<Plan, PartsError> {
     let whole = |why| Err(PartsError::NeedsWhole { why });
     let purpose = purpose(config, parts)?;
@@ -297,7 +297,7 @@ impl<'a> GridCut<'a> {
         config: &BuildConfig,
         purpose: Purpose,
         metadata: BTreeMap<String, String>,
-        put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
+        put: &mut dyn FnMut(Part<'static>) -> Result<(), PartsError>,
     ) -> Result<Plan, PartsError> {
         let info = self.info(config)?;
         let sides = self.position(self.grid.dims.map(|n| n - 1));

@@ -54,7 +54,8 @@
 //! ```
 //! use std::ops::ControlFlow;
 //! use tetralod_build::BuildConfig;
-//! use tetralod_build::parts::{self, Node};
+//! use std::io::Cursor;
+//! use tetralod_build::parts::{self, InMemory, Node, Part, PartUpdates};
 //!
 //! let mesh = tetralod_io::generate::bucky(9)?;
 //! let mut parted = Vec::new();
@@ -63,15 +64,24 @@
 //!     Ok(())
 //! })?;
 //! assert_eq!(plan.levels(), [2, 1]);
+//! let scratch = InMemory::default();
 //! let mut go_on = |_| ControlFlow::Continue(());
-//! let mut made = Vec::new();
+//! let mut files = Vec::new();
 //! for part in parted {
-//!     made.push(parts::build_part(part, &mut go_on)?);
+//!     let (left, updates) = parts::build_part(part, &scratch, &mut go_on)?;
+//!     let mut file = Vec::new();
+//!     left.write_built(&updates, &mut file)?;
+//!     files.push((left.node(), file));
 //! }
-//! let of_parts = made.iter().map(|(left, _)| left.clone()).collect();
-//! made.push(parts::join(Node { level: 1, index: 0 }, of_parts, &mut go_on)?);
-//! let of = |node| made.iter().find(|(left, _)| left.node() == node).cloned().unwrap();
-//! let built = parts::assemble(&plan, &|node| Ok(of(node).0), &|node| Ok(of(node).1), &mut go_on)?;
+//! let of_parts = files.iter().map(|(_, file)| Part::read(&mut Cursor::new(file), &scratch));
+//! let of_parts = of_parts.collect::<Result<_, _>>()?;
+//! let (left, updates) = parts::join(Node { level: 1, index: 0 }, of_parts, &scratch, &mut go_on)?;
+//! let mut file = Vec::new();
+//! left.write_built(&updates, &mut file)?;
+//! files.push((left.node(), file));
+//! let of = |node| Cursor::new(&files.iter().find(|(of, _)| *of == node).unwrap().1);
+//! let left = |node| Part::read_mesh(&mut of(node));
+//! let built = parts::assemble(&plan, &left, &|node| PartUpdates::read(&mut of(node)), &mut go_on)?;
 //! assert_eq!(built.summary.tetrahedra, 6 * 8 * 8 * 8);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -87,8 +97,8 @@ mod partition;
 mod piece;
 mod piecewise;
 mod plan;
+mod points_frame;
 mod prepared;
-mod scratch;
 mod wire;
 
 pub use assemble::assemble;
@@ -102,9 +112,10 @@ pub use partition::part;
 pub use piece::{Part, PartUpdates};
 pub use piecewise::Piecewise;
 pub use plan::{MOST_PARTS, Node, Plan};
+
 #[doc(hidden)]
-pub use scratch::InMemory;
-pub use scratch::Scratch;
+pub use crate::scratch::InMemory;
+pub use crate::scratch::Scratch;
 
 use crate::BuildError;
 use std::io;

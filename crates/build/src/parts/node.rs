@@ -4,26 +4,32 @@
 
 use super::PartsError;
 use super::numbering;
-use super::piece::{Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
+use super::piece::{Carried, Head, Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
+use super::points_frame::PointsInBuckets;
 use crate::change::work_mesh::{ELSEWHERE, WorkMesh};
 use crate::decimate::Decimator;
 use crate::decimate::candidate_queue::Levels;
 use crate::decimate::collapses::{Collapse, Collapses};
 use crate::decimate::removal::{History, State};
 use crate::error::boundary_distance::BoundaryDistance;
+use crate::error::buckets::Buckets;
 use crate::error::fill_cost::Removals;
+use crate::error::outside_points::Known;
 use crate::error::points::as_vec;
-use crate::error::reference::{Buckets, Reference};
+use crate::error::reference::Reference;
+use crate::error::stored_points::{StoredPoint, StoredPoints};
 use crate::lattice::places::Places;
 use crate::lattice::quantize::Quantized;
 use crate::lattice::sides::Sides;
 use crate::order::reach::{self, Reach};
 use crate::restrict::restrictions::Restrictions;
+use crate::scratch::Scratch;
 use crate::{BuildError, BuildProgress, OnProgress};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::mem::take;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use tetralod::mesh::{NONE, Topology, boundary_faces, growth_order, topology};
 use tetralod::mt::{ErrorCode, MtInfo};
@@ -40,25 +46,32 @@ pub(crate) const LEFT_AT_INTERFACE: usize = 8;
 ///
 /// # Errors
 /// If the part has been built already, or its mesh is not valid; if `progress` stops the work.
-pub fn build_part(part: Part, progress: OnProgress<'_>) -> Result<(Part, PartUpdates), PartsError> {
-    let Part { head, piece } = part;
+pub fn build_part<'s>(
+    part: Part<'_>,
+    scratch: &'s dyn Scratch,
+    progress: OnProgress<'_>,
+) -> Result<(Part<'s>, PartUpdates), PartsError> {
+    let Part { head, piece, .. } = part;
     if head.built || head.node.level > 0 {
         return Err(PartsError::Damaged { what: "it has been built already" });
     }
     let vertices = piece.points.len();
-    run(head, (piece, vertices), progress)
+    let stored = stored_points(&head, piece.tets.len(), scratch);
+    run(head, (piece, vertices), (stored, Vec::new()), progress)
 }
 
 /// Joins what is left of the parts of a node, in their order, and simplifies what was between them: returns what is left, and the
 /// updates.
 ///
 /// # Errors
-/// If the parts are not the children of the node ([`Plan::children`]), of one plan and built; if `progress` stops the work.
-pub fn join(
+/// If the parts are not the children of the node ([`Plan::children`]), of one plan and built; if `progress` stops the work, or a
+/// scratch fails.
+pub fn join<'s>(
     node: Node,
-    parts: Vec<Part>,
+    parts: Vec<Part<'s>>,
+    scratch: &'s dyn Scratch,
     progress: OnProgress<'_>,
-) -> Result<(Part, PartUpdates), PartsError> {
+) -> Result<(Part<'s>, PartUpdates), PartsError> {
     let Some(first) = parts.first() else {
         return Err(PartsError::NoNode { level: node.level, index: node.index });
     };
@@ -68,20 +81,36 @@ pub fn join(
     }
     let children = plan.children(node)?;
     let given = parts.iter().map(|part| part.head.node);
-    if !given.eq(children.iter().copied()) || parts.iter().any(|part| !part.head.built) {
+    if !given.eq(children.iter().copied()) || parts.iter().any(|part| part.in_buckets.is_none()) {
         let ends = [children.first(), children.last()].map(|child| child.map_or(0, |child| child.index));
         return Err(PartsError::Children { level: node.level, index: node.index, children: ends });
     }
-    let numbered = numbering::joined(&plan, node, parts.into_iter().map(|part| part.piece).collect());
-    run(Head { plan, node, built: true }, numbered, progress)
+    let head = Head { plan: plan.clone(), node, built: true };
+    let (mut stored, mut outside) = (stored_points(&head, 0, scratch), Vec::new());
+    let mut pieces = Vec::new();
+    for Part { piece, in_buckets, .. } in parts {
+        pieces.push(piece);
+        if let Some((points, of_part)) = in_buckets {
+            stored.append(points);
+            outside.extend(of_part);
+        }
+    }
+    run(head, numbering::joined(&plan, node, pieces), (stored, outside), progress)
+}
+
+/// The points in buckets of a node, which has none yet.
+fn stored_points<'s>(head: &Head, tets: usize, scratch: &'s dyn Scratch) -> StoredPoints<'s> {
+    let Node { level, index } = head.node;
+    StoredPoints::new(head.plan.record_layout(), tets, scratch, format!("points-{level}-{index}"))
 }
 
 /// Simplifies a piece, of whose points so many are vertices of the mesh: the first ones.
-fn run(
+fn run<'s>(
     head: Head,
     (mut piece, vertices): (Piece, usize),
+    in_buckets: PointsInBuckets<'s>,
     progress: OnProgress<'_>,
-) -> Result<(Part, PartUpdates), PartsError> {
+) -> Result<(Part<'s>, PartUpdates), PartsError> {
     let Head { plan, node, .. } = head;
     let info = MtInfo { vertices: vertices as u32, ..plan.info() };
     let before = piece.tets.len();
@@ -90,17 +119,25 @@ fn run(
     let earlier: Vec<ErrorCode> = piece.carried.earlier_errors.iter().copied().map(ErrorCode).collect();
     let inner = take(&mut piece.inner);
     let inner = if inner.is_empty() { vec![0; before] } else { inner };
-    let state = state(&plan, node, (&mut piece, topology), &quantized)?;
+    let failure = in_buckets.0.failure.clone();
+    let state = state(&plan, node, (&mut piece, topology), in_buckets, &quantized)?;
     let mut record = Collapses::resume(&info, earlier, inner);
     let left = before.div_ceil(LEFT).max(LEFT_AT_INTERFACE * piece.carried.interface.len());
     let enough = if plan.is_whole(node) { 0 } else { left as u32 };
     let mut decimator = Decimator::new(state, None, &mut record);
-    decimator.remove_until(enough, &mut |now| progress(of_step(now, before, enough)))?;
+    let done = decimator.remove_until(enough, &mut |now| match failure.is_set() {
+        true => ControlFlow::Break(()),
+        false => progress(of_step(now, before, enough)),
+    });
+    failure.take()?;
+    done?;
     let state = decimator.finish();
-    take_what_is_left(state, &mut piece);
+    let stored = take_what_is_left(state, &mut piece);
     take_points(quantized, &mut piece);
     let head = Head { plan, node, built: true };
-    Ok(sorted_out(head, (piece, vertices), record))
+    let (piece, updates) = sorted_out(&head, (piece, vertices), record);
+    let in_buckets = stored.map(|stored| (stored, Vec::new()));
+    Ok((Part { head: head.clone(), piece, in_buckets }, PartUpdates { head, rows: updates }))
 }
 
 /// The progress of a step by its tetrahedra, from so many to `enough`: it ends before the vertices do, and begins after others. A step
@@ -160,12 +197,13 @@ fn take_points(quantized: Quantized, piece: &mut Piece) {
 }
 
 /// The state of the builder in which a piece is, of which it takes what changes.
-fn state<'a>(
+fn state<'a, 's>(
     plan: &Plan,
     node: Node,
     (piece, topology): (&mut Piece, Topology),
+    (mut stored, outside): PointsInBuckets<'s>,
     quantized: &'a Quantized,
-) -> Result<State<'a>, PartsError> {
+) -> Result<State<'a, 's>, PartsError> {
     let Topology { mut neighbors, non_manifold, .. } = topology;
     mark_interface(piece, &mut neighbors)?;
     let vertices = non_manifold.len();
@@ -185,10 +223,16 @@ fn state<'a>(
     };
     let open = among_vertices(&mut piece.carried.shared.iter().map(|(v, ..)| *v));
     let frozen = non_manifold.iter().zip(&open).map(|(a, b)| a | b).collect();
-    let mut buckets = Buckets::new(piece.tets.len(), quantized);
-    take(&mut piece.carried.inside).into_iter().for_each(|(v, t)| buckets.inside.put(t, v));
+    stored.names = take(&mut piece.points);
+    let layout = stored.layout;
+    let outside = [outside, store_first(&mut stored, &mut piece.carried, &reference)].concat();
+    let mut buckets = Buckets::of_stored(stored, quantized);
+    for record in outside.chunks_exact(layout.len()) {
+        let point = StoredPoint::new(record, layout);
+        let known = || Known::at(point.own_place()).with(record);
+        buckets.outside_points.set_outside(point.id(), true, known);
+    }
     take(&mut piece.carried.border).into_iter().for_each(|(v, t)| buckets.border.put(t, v));
-    take(&mut piece.carried.outside).into_iter().for_each(|v| buckets.outside_points.set_outside(v, true));
     take(&mut piece.carried.foreign).into_iter().for_each(|(v, t)| buckets.outside_points.add_foreign(t, v));
     let mut removals = Removals::new(piece.tets.len());
     if !piece.makers.is_empty() {
@@ -213,6 +257,24 @@ fn state<'a>(
     Ok(State { open, restrictions, ..state })
 }
 
+/// Stores the points that are in buckets before anything is removed. Returns the records of those that are outside.
+fn store_first(stored: &mut StoredPoints<'_>, carried: &mut Carried, reference: &Reference<'_>) -> Vec<u8> {
+    let (mut inside, outside) = (take(&mut carried.inside), take(&mut carried.outside));
+    let mut of_outside = Vec::new();
+    inside.sort_by_key(|(_, t)| *t);
+    for of_tet in inside.chunk_by(|a, b| a.1 == b.1) {
+        let (mut records, mut extents) = (Vec::new(), Vec::new());
+        for (v, _) in of_tet {
+            let (from, is_outside) = (records.len(), outside.binary_search(v).is_ok());
+            stored.record(*v, reference, is_outside, &mut records);
+            of_outside.extend_from_slice(if is_outside { &records[from..] } else { &[] });
+        }
+        stored.store(&records, &mut extents);
+        stored.put(of_tet[0].1, extents);
+    }
+    of_outside
+}
+
 /// Enters which faces without a neighbour lead to other parts.
 fn mark_interface(piece: &Piece, neighbors: &mut [[u32; 4]]) -> Result<(), PartsError> {
     let mut faces: Vec<[u32; 3]> = piece.carried.interface.iter().map(|(face, _)| *face).collect();
@@ -235,9 +297,9 @@ fn mark_interface(piece: &Piece, neighbors: &mut [[u32; 4]]) -> Result<(), Parts
     }
 }
 
-/// Gives a piece what is left of what the state has taken, but for what follows from the record.
-fn take_what_is_left(state: State<'_>, piece: &mut Piece) {
-    let State { mesh, buckets, reference, reaches, restrictions, .. } = state;
+/// Gives a piece what is left of what the state has taken, but for what follows from the record. Returns the points in buckets.
+fn take_what_is_left<'s>(state: State<'_, 's>, piece: &mut Piece) -> Option<StoredPoints<'s>> {
+    let State { mesh, mut buckets, reference, reaches, restrictions, .. } = state;
     let live: Vec<u32> = (0..mesh.tets.len() as u32).filter(|&t| mesh.is_live(t)).collect();
     let regions = restrictions.regions();
     let with_regions = if regions.is_empty() { &[][..] } else { &live };
@@ -250,14 +312,14 @@ fn take_what_is_left(state: State<'_>, piece: &mut Piece) {
     carried.boundary = reference.boundary.all().to_vec();
     carried.border = pairs(&live, |t| buckets.border.iter(t));
     carried.foreign = pairs(&live, |t| buckets.outside_points.foreign_to(t));
-    carried.inside = pairs(&live, |t| buckets.inside.iter(t));
-    let is_outside = |v: &u32| buckets.outside_points.is_outside(*v);
-    carried.outside = carried.inside.iter().map(|(v, _)| *v).filter(is_outside).collect();
-    carried.outside.sort_unstable();
+    let mut stored = buckets.stored.take()?;
+    stored.renumber(&live);
+    piece.points = take(&mut stored.names);
+    Some(stored)
 }
 
 /// Pairs of a point of these lists and the new number of its tetrahedron, given those that are left.
-fn pairs<I: Iterator<Item = u32>>(live: &[u32], of: impl Fn(u32) -> I) -> Vec<(u32, u32)> {
+fn pairs<P, I: Iterator<Item = P>>(live: &[u32], of: impl Fn(u32) -> I) -> Vec<(P, u32)> {
     let mut pairs = Vec::with_capacity(live.iter().map(|&t| of(t).count()).sum());
     (0..).zip(live).for_each(|(now, &t)| pairs.extend(of(t).map(|point| (point, now))));
     pairs
@@ -265,10 +327,10 @@ fn pairs<I: Iterator<Item = u32>>(live: &[u32], of: impl Fn(u32) -> I) -> Vec<(u
 
 /// Orders the updates, and makes what is left refer to them.
 fn sorted_out(
-    head: Head,
+    head: &Head,
     (mut piece, vertices): (Piece, usize),
     mut record: Collapses,
-) -> (Part, PartUpdates) {
+) -> (Piece, UpdateRows) {
     let block_bits = head.plan.block_bits;
     let domain = Some(head.plan.sides);
     let order = match head.plan.is_whole(head.node) {
@@ -323,5 +385,5 @@ fn sorted_out(
     piece.earlier = earlier;
     piece.carried.earlier_errors = earlier_errors;
     piece.vertices = vertices;
-    (Part { head: head.clone(), piece }, PartUpdates { head, rows })
+    (piece, rows)
 }

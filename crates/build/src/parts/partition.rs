@@ -29,7 +29,7 @@ pub fn part(
     config: &BuildConfig,
     parts: u32,
     metadata: BTreeMap<String, String>,
-    put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
+    put: &mut dyn FnMut(Part<'static>) -> Result<(), PartsError>,
 ) -> Result<Plan, PartsError> {
     let purpose = purpose(config, parts)?;
     if mesh.positions.len() > MAX_UPDATES as usize {

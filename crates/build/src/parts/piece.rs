@@ -1,23 +1,28 @@
 //! What is left of a part of the domain, and the updates that were made of the rest: what steps hand to each other.
 //!
-//! What is left travels with all of its reference vertices, the buckets they are in, the errors and the numbers of the updates that made each
+//! What is left travels with all of its reference vertices ([`super::points_frame`]), the buckets they are in, the errors and the numbers of the updates that made each
 //! tetrahedron, and the boundary of the reference mesh: so a node that joins eight of them goes on as if nothing had happened, errors stay exact
 //! and monotone, and one part alone gives the bytes of a whole.
 
 use super::PartsError;
 use super::plan::{Node, Plan};
+use super::points_frame::{self, PointsInBuckets};
 use super::wire::{read_frame, read_magic, read_numbers, skip_frame, write_frame, write_magic};
+use crate::error::points::PointId;
 use crate::lattice::sides::Sides;
+use crate::scratch::Scratch;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::io::{Read, Seek, SeekFrom, Write};
 use tetralod::geom::orient3d;
 use tetralod::mesh::NONE;
 
 /// A part of the domain with what is left of its mesh; [`super`] tells what it is for.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct Part<'s> {
     pub(super) head: Head,
     pub(super) piece: Piece,
+    /// The points in buckets, once it has been built; none where [assembling](super::assemble) reads it.
+    pub(super) in_buckets: Option<PointsInBuckets<'s>>,
 }
 
 /// The updates that were made of a part, in the order of the MT.
@@ -45,8 +50,8 @@ pub(super) struct Made {
 /// A mesh, what its vertices were, and where they are now. Points and tetrahedra are numbers of this piece unless it says otherwise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Piece {
-    /// The reference vertex of the whole for each point: those of the mesh that the piece was before it was built, ascending, then all
-    /// others, which are in buckets.
+    /// The reference vertex of the whole for each point that has a number: those of the mesh that the piece was before it was built,
+    /// ascending, then others on the boundary of the reference mesh.
     pub points: Vec<u32>,
     /// On the lattice of the whole.
     pub positions: Vec<[i32; 3]>,
@@ -110,12 +115,13 @@ pub(super) struct Carried {
     pub interface: Vec<([u32; 3], u32)>,
     /// The errors of [`Piece::earlier`], field by field.
     pub earlier_errors: Vec<u16>,
-    /// Points that are in buckets, and of which tetrahedron: see `error::cost`.
+    /// Points that are in buckets before the part is built, and of which tetrahedron: see `error::cost`.
     pub inside: Vec<(u32, u32)>,
-    pub border: Vec<(u32, u32)>,
-    pub foreign: Vec<(u32, u32)>,
-    /// Those in buckets of tetrahedra that they are outside of.
+    /// Those of these that are outside of their tetrahedra.
     pub outside: Vec<u32>,
+    pub border: Vec<(u32, u32)>,
+    /// Points outside of their tetrahedra by their names, and others that contain them.
+    pub foreign: Vec<(PointId, u32)>,
     /// The boundary of the reference mesh, once the part has been built.
     pub boundary: Vec<[u32; 3]>,
     /// Points that stay where they are, ascending.
@@ -205,25 +211,30 @@ impl Sided {
         Self { first, further, values: own.into_iter().flat_map(values).collect() }
     }
 
-    /// Those of several pieces as those of one, of so many points; `numbers` has for each piece where its points are there, and gets where its sides
-    /// are.
-    pub fn joined(pieces: &[Piece], points: usize, fields: usize, numbers: &mut [Vec<u32>]) -> Self {
+    /// Those of several pieces as those of one, of so many points; `numbers` has for each piece where its points are there, [`NONE`] for those
+    /// that are not.
+    pub fn joined(pieces: &[Piece], points: usize, fields: usize, numbers: &[Vec<u32>]) -> Self {
         let own = |(piece, numbers): (&Piece, &Vec<u32>)| -> Vec<(u32, u32)> {
             piece.sided.further.iter().map(|&(v, region)| (numbers[v as usize], region)).collect()
         };
-        let of_pieces: Vec<Vec<(u32, u32)>> = pieces.iter().zip(&*numbers).map(own).collect();
+        let of_pieces: Vec<Vec<(u32, u32)>> = pieces.iter().zip(numbers).map(own).collect();
         let mut further = of_pieces.concat();
+        further.retain(|(v, _)| *v != NONE);
         further.sort_unstable();
         further.dedup();
         let jumps = pieces.iter().any(|piece| !piece.sided.first.is_empty());
         let mut first = vec![0; if jumps { points } else { 0 }];
         let mut values = vec![0.0; further.len() * fields];
         for ((Piece { sided, .. }, own), numbers) in pieces.iter().zip(of_pieces).zip(numbers) {
-            sided.first.iter().zip(&*numbers).for_each(|(&region, &v)| first[v as usize] = region);
-            for (side, of_side) in own.iter().zip(sided.values.chunks(fields)) {
+            let known = |v: u32| v != NONE;
+            for (&region, &v) in sided.first.iter().zip(numbers).filter(|(_, v)| known(**v)) {
+                first[v as usize] = region;
+            }
+            for (side, of_side) in
+                own.iter().zip(sided.values.chunks(fields)).filter(|(side, _)| known(side.0))
+            {
                 let at = further.partition_point(|other| other < side);
                 values[at * fields..][..fields].copy_from_slice(of_side);
-                numbers.push((points + at) as u32);
             }
         }
         Self { first, further, values }
@@ -302,10 +313,10 @@ impl Piece {
         points.iter().map(place).collect()
     }
 
-    /// Puts what a piece has of points to where they are here.
+    /// Puts what a piece has of points to where they are here, unless that is [`NONE`].
     pub fn put(&mut self, places: &[u32], positions: &[[i32; 3]], values: &[f64], shortest: &[f64]) {
         let fields = values.len() / places.len().max(1);
-        for (i, &at) in places.iter().enumerate() {
+        for (i, &at) in places.iter().enumerate().filter(|(_, at)| **at != NONE) {
             let at = at as usize;
             self.positions[at] = positions[i];
             self.carried.shortest[at] = shortest[i];
@@ -344,11 +355,18 @@ impl Plan {
     }
 }
 
-impl Part {
+impl fmt::Debug for Part<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Part").field("head", &self.head).field("piece", &self.piece).finish_non_exhaustive()
+    }
+}
+
+impl<'s> Part<'s> {
     /// A part of the reference mesh.
     pub(super) fn of(plan: &Plan, index: u32, mut piece: Piece) -> Self {
         piece.vertices = piece.points.len();
-        Self { head: Head { plan: plan.clone(), node: Node { level: 0, index }, built: false }, piece }
+        let head = Head { plan: plan.clone(), node: Node { level: 0, index }, built: false };
+        Self { head, piece, in_buckets: None }
     }
 
     /// Which part it is.
@@ -376,10 +394,14 @@ impl Part {
     /// # Errors
     /// If `out` fails.
     pub fn write_built(&self, updates: &PartUpdates, out: &mut dyn Write) -> Result<(), PartsError> {
+        let Some((in_buckets, _)) = &self.in_buckets else {
+            return Err(PartsError::Damaged { what: "it has not been built" });
+        };
         write_magic(out)?;
         write_frame(out, &self.head)?;
         write_frame(out, &updates.rows)?;
-        self.write_piece(out)
+        self.write_piece(out)?;
+        points_frame::write(out, in_buckets)
     }
 
     fn write_piece(&self, out: &mut dyn Write) -> Result<(), PartsError> {
@@ -389,15 +411,21 @@ impl Part {
         write_frame(out, &self.piece.carried)
     }
 
-    /// Reads a part, built or not.
+    /// Reads a part, built or not; `scratch` has those of its points that are not kept in memory.
     ///
     /// # Errors
-    /// If `input` fails, or holds no whole and sound part.
-    pub fn read<R: Read + Seek>(input: &mut R) -> Result<Self, PartsError> {
+    /// If `input` or `scratch` fails, or `input` holds no whole and sound part.
+    pub fn read<R: Read + Seek>(input: &mut R, scratch: &'s dyn Scratch) -> Result<Self, PartsError> {
         let mut part = Self::read_first(input)?;
         part.piece.extend(read_numbers(input)?);
         part.piece.carried = read_numbers(input)?;
         part.check().and_then(|()| part.check_carried()).map_err(|what| PartsError::Damaged { what })?;
+        let Head { plan, node, built } = &part.head;
+        if *built {
+            let name = format!("points-{}-{}", node.level, node.index);
+            let tets = part.piece.tets.len();
+            part.in_buckets = Some(points_frame::read(input, plan, tets, (scratch, name))?);
+        }
         Ok(part)
     }
 
@@ -420,7 +448,7 @@ impl Part {
         }
         let mut piece: Piece = read_numbers(input)?;
         piece.vertices = piece.points.len();
-        Ok(Self { head, piece })
+        Ok(Self { head, piece, in_buckets: None })
     }
 
     /// Reads what a part that has been built is of, and checks that it is as long as it says; the rest of it is not read.
@@ -433,7 +461,7 @@ impl Part {
         if !built {
             return Err(PartsError::Damaged { what: "it has not been built" });
         }
-        (0..4).try_for_each(|_| skip_frame(input))?;
+        (0..5).try_for_each(|_| skip_frame(input))?;
         let end = input.stream_position()?;
         if input.seek(SeekFrom::End(0))? == end {
             Ok((plan, node))
@@ -444,7 +472,7 @@ impl Part {
 
     /// Checks what building and assembling rely on.
     fn check(&self) -> Result<(), &'static str> {
-        let Self { head: Head { plan, node, .. }, piece } = self;
+        let Self { head: Head { plan, node, .. }, piece, .. } = self;
         let (points, fields) = (piece.points.len(), plan.fields.len());
         expect(plan.has(*node) && fields > 0, "it is not of its plan")?;
         let rise = |points: &[u32]| points.windows(2).all(|pair| pair[0] < pair[1]);
@@ -452,7 +480,7 @@ impl Part {
         sorted.sort_unstable();
         let known = sorted.last().is_none_or(|&last| last < plan.counts.0);
         expect(known && rise(&sorted) && rise(&piece.points[..piece.vertices]), "its points are others")?;
-        let side = 1_i32.checked_shl(plan.lattice.2).filter(|_| plan.lattice.2 <= 30).unwrap_or(0);
+        let side = plan.lattice_side();
         let is_on = |p: &[i32; 3]| p.iter().all(|x| (0..=side).contains(x));
         let are_finite = piece.values.iter().all(|x| x.is_finite());
         let lengths = [piece.positions.len(), piece.values.len() / fields];
@@ -488,16 +516,19 @@ impl Part {
 
     /// Checks what building relies on besides.
     fn check_carried(&self) -> Result<(), &'static str> {
-        let Self { head: Head { plan, .. }, piece: Piece { points, tets, earlier, sided, carried, .. } } =
-            self;
+        let Self {
+            head: Head { plan, .. }, piece: Piece { points, tets, earlier, sided, carried, .. }, ..
+        } = self;
         let points = points.len();
         expect(carried.shortest.len() == points, LACKS_VALUES)?;
         expect(carried.earlier_errors.len() == earlier.len() * plan.fields.len(), "its updates lack errors")?;
         let is_point = |v: &u32| (*v as usize) < points;
         let is_any = |v: &u32| (*v as usize) < points + sided.further.len();
-        let in_bucket = |(v, t): &(u32, u32)| is_any(v) && (*t as usize) < tets.len();
-        let buckets = [&carried.inside, &carried.border, &carried.foreign];
-        expect(buckets.iter().all(|all| all.iter().all(in_bucket)), "its buckets are others")?;
+        let is_tet = |t: &u32| (*t as usize) < tets.len();
+        let are_buckets = carried.inside.iter().all(|(v, t)| is_any(v) && is_tet(t))
+            && carried.border.iter().all(|(v, t)| is_point(v) && is_tet(t))
+            && carried.foreign.iter().all(|(_, t)| is_tet(t));
+        expect(are_buckets, "its buckets are others")?;
         let refers = carried.outside.iter().all(is_any)
             && carried.moved.windows(2).all(|pair| pair[0].0 < pair[1].0)
             && carried.moved.iter().all(|(v, place)| is_point(v) && place.iter().all(|x| x.is_finite()))
@@ -572,6 +603,7 @@ mod tests {
     use super::super::{build_part, part};
     use super::*;
     use crate::BuildConfig;
+    use crate::scratch::InMemory;
     use std::collections::BTreeMap;
     use std::io::Cursor;
     use std::ops::ControlFlow;
@@ -580,8 +612,8 @@ mod tests {
     /// What is wrong, and how it gets so.
     type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
 
-    /// A part as it is written first, and when it has been built, with its updates.
-    fn parts() -> (Part, Part, PartUpdates) {
+    /// A part as it is written first, and when it has been built, and its updates.
+    fn parts() -> ([Vec<u8>; 2], PartUpdates) {
         let grid = Grid { dims: [9; 3], origin: [0.0; 3], spacing: [1.0; 3] };
         let values = (0..9_u32.pow(3)).map(|i| f64::from(i * i % 997)).collect();
         let mesh = TetMesh::from_grid(grid, vec![Field::new("h", values)]);
@@ -591,20 +623,24 @@ mod tests {
             Ok(())
         };
         part(&mesh, &BuildConfig::default(), 2, BTreeMap::new(), put).expect("a mesh that can be parted");
-        let first = first.expect("a part");
-        let (built, updates) =
-            build_part(first.clone(), &mut |_| ControlFlow::Continue(())).expect("a part to build");
-        (first, built, updates)
+        let (first, scratch) = (first.expect("a part"), InMemory::default());
+        let (mut parted, mut bytes) = (Vec::new(), Vec::new());
+        first.write(&mut parted).expect("bytes");
+        let go_on = &mut |_| ControlFlow::Continue(());
+        let (built, updates) = build_part(first, &scratch, go_on).expect("a part to build");
+        built.write_built(&updates, &mut bytes).expect("bytes");
+        ([parted, bytes], updates)
+    }
+
+    fn read<'s>(bytes: &[u8], scratch: &'s InMemory) -> Result<Part<'s>, PartsError> {
+        Part::read(&mut Cursor::new(bytes), scratch)
     }
 
     #[test]
     fn a_part_is_surveyed_by_its_head_and_its_length() {
-        let (first, built, updates) = parts();
-        let (mut bytes, mut unbuilt) = (Vec::new(), Vec::new());
-        built.write_built(&updates, &mut bytes).expect("bytes");
-        first.write(&mut unbuilt).expect("bytes");
+        let ([unbuilt, bytes], updates) = parts();
         let survey = |bytes: &[u8]| Part::survey(&mut Cursor::new(bytes));
-        assert_eq!(survey(&bytes).expect("a whole part"), (built.head.plan, built.head.node));
+        assert_eq!(survey(&bytes).expect("a whole part"), (updates.head.plan, updates.head.node));
         let longer = [&bytes[..], b"x"].concat();
         for other in [&bytes[..bytes.len() - 1], &bytes[..bytes.len() / 2], &longer, &unbuilt] {
             assert!(matches!(survey(other), Err(PartsError::Damaged { .. })), "{} bytes", other.len());
@@ -614,8 +650,9 @@ mod tests {
 
     #[test]
     fn content_with_good_checksums_is_not_trusted() {
-        let (first, built, updates) = parts();
-        let beyond = first.piece.points.len() as u32;
+        let (written, updates) = parts();
+        let scratch = InMemory::default();
+        let beyond = read(&written[0], &scratch).expect("a part").piece.points.len() as u32;
         let changes: [Change<'_, Piece>; 12] = [
             ("a tetrahedron inside out", &|p| p.tets[0].swap(0, 1)),
             ("a flat tetrahedron", &|p| p.tets[0][1] = p.tets[0][0]),
@@ -631,16 +668,17 @@ mod tests {
             ("a kept point that is none", &|p| p.carried.kept.push(beyond)),
         ];
         for (what, change) in changes {
-            for part in [&first, &built] {
-                let mut part = part.clone();
+            for bytes in &written {
+                let mut part = read(bytes, &scratch).expect("a part");
                 change(&mut part.piece);
                 let mut bytes = Vec::new();
                 if part.head.built { part.write_built(&updates, &mut bytes) } else { part.write(&mut bytes) }
                     .expect("bytes");
-                let read = Part::read(&mut Cursor::new(&bytes));
-                assert!(matches!(read, Err(PartsError::Damaged { .. })), "{what}");
+                drop(part);
+                assert!(matches!(read(&bytes, &scratch), Err(PartsError::Damaged { .. })), "{what}");
             }
         }
+        let built = read(&written[1], &scratch).expect("a part");
         let changes: [Change<'_, UpdateRows>; 6] = [
             ("a vertex that the whole lacks", &|r| r.vertices[0] = u32::MAX),
             ("a near vertex that the whole lacks", &|r| r.near[0] = u32::MAX),

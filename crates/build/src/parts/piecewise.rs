@@ -10,12 +10,12 @@ use super::partition::{between, shared_faces};
 use super::piece::Part;
 use super::plan::{Plan, purpose};
 use super::prepared::{Prepared, Stored, Whole, places};
-use super::scratch::Scratch;
 use crate::lattice::field_lattice;
 use crate::lattice::field_selection;
 use crate::lattice::position_lattice;
 use crate::lattice::quantize::{self, Quantized};
 use crate::restrict::restrictions::Restrictions;
+use crate::scratch::Scratch;
 use crate::{BuildConfig, BuildError, Purpose};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -177,7 +177,7 @@ impl<'a> Piecewise<'a> {
     pub fn part(
         mut self,
         metadata: BTreeMap<String, String>,
-        put: &mut dyn FnMut(Part) -> Result<(), PartsError>,
+        put: &mut dyn FnMut(Part<'static>) -> Result<(), PartsError>,
     ) -> Result<Plan, PartsError> {
         if self.sums.tets == 0 {
             return Err(BuildError::Empty.into());

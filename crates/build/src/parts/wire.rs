@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 
 /// How each file begins; the last byte is the version.
-const MAGIC: [u8; 8] = *b"mtparts\x06";
+const MAGIC: [u8; 8] = *b"mtparts\x07";
 
 /// Bytes in front of a frame.
 const HEAD: usize = 12;
@@ -26,7 +26,7 @@ pub fn read_magic(input: &mut dyn Read) -> Result<(), PartsError> {
 }
 
 /// Passes bytes on, counts them, and takes their checksum.
-struct Summed<T> {
+pub struct Summed<T> {
     inner: T,
     len: u64,
     hasher: crc32fast::Hasher,
@@ -67,20 +67,31 @@ impl<T: Read> Read for Summed<T> {
     }
 }
 
-/// The value is serialised twice, at first for its length and checksum alone: its bytes are never there as a whole.
+/// Writes a frame of a value.
 pub fn write_frame<T: Serialize>(out: &mut dyn Write, value: &T) -> Result<(), PartsError> {
-    let unwritten = |_| PartsError::Damaged { what: "it cannot be written" };
-    let counted = postcard::to_io(value, BufWriter::new(Summed::new(io::sink()))).map_err(unwritten)?;
-    let counted = counted.into_inner().map_err(|error| error.into_error())?;
-    let (len, crc) = counted.sums();
+    write_by(out, |out| {
+        let mut out = Kept { out, failed: None };
+        let written = postcard::to_io(value, &mut out).map(drop);
+        match out.failed {
+            Some(error) => Err(error.into()),
+            None => written.map_err(|_| PartsError::Damaged { what: "it cannot be written" }),
+        }
+    })
+}
+
+/// Writes a frame by `write`, which is called twice, at first for the length and the checksum alone: its bytes are never there as a whole.
+pub fn write_by(
+    out: &mut dyn Write,
+    write: impl Fn(&mut dyn Write) -> Result<(), PartsError>,
+) -> Result<(), PartsError> {
+    let mut counted = BufWriter::new(Summed::new(io::sink()));
+    write(&mut counted)?;
+    let (len, crc) = counted.into_inner().map_err(|error| error.into_error())?.sums();
     out.write_all(&len.to_le_bytes())?;
     out.write_all(&crc.to_le_bytes())?;
-    let mut out = Kept { out: BufWriter::new(out), failed: None };
-    let written = postcard::to_io(value, &mut out).map(drop).map_err(unwritten);
-    match out.failed {
-        Some(error) => Err(error.into()),
-        None => written.and_then(|()| Ok(out.out.flush()?)),
-    }
+    let mut out = BufWriter::new(out);
+    write(&mut out)?;
+    Ok(out.flush()?)
 }
 
 /// Keeps why it failed: `postcard` does not tell.
@@ -133,10 +144,13 @@ pub fn read_numbers<T: DeserializeOwned>(input: &mut dyn Read) -> Result<T, Part
     })
 }
 
-/// Reads a value by `read`, which reads its frame to the end.
-fn read_by<T>(
-    input: &mut dyn Read,
-    read: impl FnOnce(&mut BufReader<Summed<io::Take<&mut dyn Read>>>) -> io::Result<Option<T>>,
+/// A frame that is read.
+pub type Frame<'a> = BufReader<Summed<io::Take<&'a mut dyn Read>>>;
+
+/// Reads a value by `read`, which reads its frame to the end; none if the content is no such value.
+pub fn read_by<'a, T>(
+    input: &'a mut dyn Read,
+    read: impl FnOnce(&mut Frame<'a>) -> io::Result<Option<T>>,
 ) -> Result<T, PartsError> {
     let (len, crc) = read_head(input)?;
     let mut frame = BufReader::new(Summed::new(input.take(len)));

@@ -36,32 +36,51 @@ impl Files {
     }
 
     fn build(&mut self, index: u32) {
-        let part = read(&self.parted[index as usize]).expect("a part");
-        let (part, updates) = parts::build_part(part, &mut go_on).expect("a part to build");
-        self.keep(&part, &updates);
+        let scratch = InMemory::at_once();
+        let part = read(&self.parted[index as usize], &scratch).expect("a part");
+        let (part, updates) = parts::build_part(part, &scratch, &mut go_on).expect("a part to build");
+        self.keep(part, &updates);
+        assert_eq!(scratch.names(), [""; 0], "nothing is left in the scratch");
     }
 
-    fn keep(&mut self, part: &Part, updates: &PartUpdates) {
+    fn keep(&mut self, part: Part<'_>, updates: &PartUpdates) {
         let mut bytes = Vec::new();
         part.write_built(updates, &mut bytes).expect("bytes");
         assert_eq!(&PartUpdates::read(&mut Cursor::new(&bytes)).expect("updates"), updates);
-        assert_eq!(&read(&bytes).expect("a part"), part);
+        let scratch = InMemory::default();
+        let again = read(&bytes, &scratch).expect("a part");
+        // The points in a bucket come in the other order.
+        let (mut turned, mut twice) = (Vec::new(), Vec::new());
+        again.write_built(updates, &mut turned).expect("bytes");
+        let again = read(&turned, &scratch).expect("a part");
+        again.write_built(updates, &mut twice).expect("bytes");
+        assert!(bytes == twice, "another part");
         self.built.insert(part.node(), bytes);
     }
 
+    /// Joins twice, with points that are in memory and with points that are not.
     fn join(&mut self, plan: &Plan, node: Node) {
         let children = plan.children(node).expect("children");
-        let left = children.iter().map(|child| read(&self.built[child]).expect("a part")).collect();
-        let (part, updates) = parts::join(node, left, &mut go_on).expect("parts to join");
-        self.keep(&part, &updates);
+        let mut files = Vec::new();
+        for scratch in [InMemory::default(), InMemory::at_once()] {
+            let left =
+                children.iter().map(|child| read(&self.built[child], &scratch).expect("a part")).collect();
+            let (part, updates) = parts::join(node, left, &scratch, &mut go_on).expect("parts to join");
+            let mut bytes = Vec::new();
+            part.write_built(&updates, &mut bytes).expect("bytes");
+            files.push(bytes);
+            self.keep(part, &updates);
+            assert_eq!(scratch.names(), [""; 0], "nothing is left in the scratch");
+        }
+        assert!(files[0] == files[1], "another part");
     }
 
     fn updates(&self, node: Node) -> Result<PartUpdates, PartsError> {
         PartUpdates::read(&mut Cursor::new(&self.built[&node]))
     }
 
-    fn left(&self, node: Node) -> Result<Part, PartsError> {
-        read(&self.built[&node])
+    fn left(&self, node: Node) -> Result<Part<'static>, PartsError> {
+        Part::read_mesh(&mut Cursor::new(&self.built[&node]))
     }
 
     /// The MT as a whole. Its file is the same where it is written while the MT is made.
@@ -72,8 +91,7 @@ impl Files {
             let (mut aside, scratch) = (Aside::default(), InMemory::default());
             let mut encoder = BlockEncoder::new(&mut aside);
             let take = &mut |builder: &mut _| encoder.take_blocks(builder).map_err(PartsError::other);
-            let mesh = |node| Part::read_mesh(&mut Cursor::new(&self.built[&node]));
-            let made = parts::assemble_blocks(plan, (&mesh, &updates), &scratch, take, &mut go_on);
+            let made = parts::assemble_blocks(plan, (&left, &updates), &scratch, take, &mut go_on);
             let Assembled { builder, summary, .. } = made.expect("an MT");
             let mut bytes = Vec::new();
             let (mt, len) = encoder.finish(builder, &options(&built), &mut bytes).expect("a file");
@@ -112,8 +130,8 @@ fn options(built: &BuildResult) -> EncodeOptions {
     }
 }
 
-fn read(bytes: &[u8]) -> Result<Part, PartsError> {
-    Part::read(&mut Cursor::new(bytes))
+fn read<'s>(bytes: &[u8], scratch: &'s InMemory) -> Result<Part<'s>, PartsError> {
+    Part::read(&mut Cursor::new(bytes), scratch)
 }
 
 pub fn in_parts(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> BuildResult {
@@ -206,8 +224,15 @@ fn parts_make_one_mt_that_keeps_every_promise() {
     }
 }
 
+/// A part that has not been built, as a file.
+pub fn written(part: &Part<'_>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    part.write(&mut bytes).expect("bytes");
+    bytes
+}
+
 /// What [`parts::part`] passes on.
-pub fn parted(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> (Plan, Vec<Part>) {
+pub fn parted(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> (Plan, Vec<Part<'static>>) {
     let mut all = Vec::new();
     let plan = parts::part(mesh, config, parts, BTreeMap::new(), &mut |part| {
         all.push(part);
@@ -244,7 +269,11 @@ fn a_grid_alone_has_the_parts_of_its_mesh() {
                 let [expected, found] = [&whole, &alone].map(|mesh| parted(mesh, &config, count));
                 assert_eq!(found.0, expected.0, "{dims:?}, {count}");
                 for (found, expected) in found.1.iter().zip(&expected.1) {
-                    assert!(found == expected, "{dims:?}, {count} parts: {:?} differs", found.node());
+                    assert!(
+                        written(found) == written(expected),
+                        "{dims:?}, {count} parts: {:?} differs",
+                        found.node()
+                    );
                 }
                 assert_eq!(found.1.len(), count as usize);
             }
@@ -286,12 +315,16 @@ fn the_progress_of_a_step_is_that_of_the_step() {
         (shares[0], shares.pop().expect("progress"))
     };
     let children = plan.children(whole).expect("children");
-    let left = || children.iter().map(|child| read(&files.built[child]).expect("a part")).collect();
+    let scratch = &InMemory::default();
+    let left = || children.iter().map(|child| read(&files.built[child], scratch).expect("a part")).collect();
     // Neither the vertices that were removed before count, nor those that stay.
-    let (first, last) = shares(&|progress| drop(parts::join(whole, left(), progress).expect("a join")));
+    let (first, last) =
+        shares(&|progress| drop(parts::join(whole, left(), scratch, progress).expect("a join")));
     assert!(first < 0.1 && last > 0.5, "{first} to {last}");
-    let part = || read(&files.parted[0]).expect("a part");
-    let (first, last) = shares(&|progress| drop(parts::build_part(part(), progress).expect("a part")));
+    let part = || read(&files.parted[0], scratch).expect("a part");
+    let build =
+        |progress: OnProgress<'_>| drop(parts::build_part(part(), scratch, progress).expect("a part"));
+    let (first, last) = shares(&build);
     assert!(first < 0.1 && last > 0.5, "{first} to {last}");
 }
 
@@ -307,8 +340,9 @@ fn levels_and_children_are_those_of_an_octree() {
         plan.children(Node { level: 2, index: 1 }).is_err()
             && plan.children(Node { level: 0, index: 0 }).is_err()
     );
+    let scratch = InMemory::default();
     let sizes: Vec<usize> =
-        files.parted.iter().map(|bytes| read(bytes).expect("a part").tetrahedra()).collect();
+        files.parted.iter().map(|bytes| read(bytes, &scratch).expect("a part").tetrahedra()).collect();
     assert_eq!(sizes.iter().sum::<usize>(), mesh.tets.len());
     assert!(sizes.iter().all(|&n| n > 0));
 }
@@ -337,30 +371,32 @@ fn what_cannot_be_parted_or_joined_is_refused() {
 
     let (plan, mut files) = Files::parted(&mesh, &config, 8);
     (0..8).for_each(|index| files.build(index));
-    let left = || -> Vec<Part> {
+    let scratch = &InMemory::default();
+    let left = || -> Vec<Part<'_>> {
         plan.children(Node { level: 1, index: 0 })
             .expect("eight")
             .iter()
-            .map(|child| read(&files.built[child]).expect("a part"))
+            .map(|child| read(&files.built[child], scratch).expect("a part"))
             .collect()
     };
     let top = Node { level: 1, index: 0 };
     let mut turned = left();
     turned.swap(0, 1);
-    assert!(matches!(parts::join(top, turned, &mut go_on), Err(PartsError::Children { .. })));
+    assert!(matches!(parts::join(top, turned, scratch, &mut go_on), Err(PartsError::Children { .. })));
     let mut few = left();
     few.pop();
-    assert!(matches!(parts::join(top, few, &mut go_on), Err(PartsError::Children { .. })));
-    let unbuilt = files.parted.iter().map(|bytes| read(bytes).expect("a part")).collect();
-    assert!(matches!(parts::join(top, unbuilt, &mut go_on), Err(PartsError::Children { .. })));
+    assert!(matches!(parts::join(top, few, scratch, &mut go_on), Err(PartsError::Children { .. })));
+    let unbuilt = files.parted.iter().map(|bytes| read(bytes, scratch).expect("a part")).collect();
+    assert!(matches!(parts::join(top, unbuilt, scratch, &mut go_on), Err(PartsError::Children { .. })));
     let (_, mut other) = Files::parted(&blocks([4; 3], &[linear], |_| true), &config, 8);
     other.build(0);
     let mut mixed = left();
-    mixed[0] = read(&other.built[&Node { level: 0, index: 0 }]).expect("a part");
-    assert!(matches!(parts::join(top, mixed, &mut go_on), Err(PartsError::OtherPlan)));
-    let stopped = parts::build_part(read(&files.parted[0]).expect("a part"), &mut |_| ControlFlow::Break(()));
+    mixed[0] = read(&other.built[&Node { level: 0, index: 0 }], scratch).expect("a part");
+    assert!(matches!(parts::join(top, mixed, scratch, &mut go_on), Err(PartsError::OtherPlan)));
+    let part = read(&files.parted[0], scratch).expect("a part");
+    let stopped = parts::build_part(part, scratch, &mut |_| ControlFlow::Break(()));
     assert!(matches!(stopped, Err(PartsError::Build(BuildError::Stopped))));
-    let twice = parts::build_part(left().remove(0), &mut go_on);
+    let twice = parts::build_part(left().remove(0), scratch, &mut go_on);
     assert!(twice.is_err());
 }
 
@@ -371,12 +407,14 @@ fn damaged_parts_are_refused() {
     (0..2).for_each(|index| files.build(index));
     let top = Node { level: 1, index: 0 };
     files.join(&plan, top);
+    let scratch = InMemory::default();
     for bytes in [&files.parted[0], &files.built[&top]] {
         for at in (0..bytes.len()).step_by(bytes.len() / 97 + 1) {
-            assert!(read(&bytes[..at]).is_err(), "cut at {at}");
+            assert!(read(&bytes[..at], &scratch).is_err(), "cut at {at}");
             let mut flipped = bytes.clone();
             flipped[at] ^= 0x10;
-            let same = read(&flipped).is_ok() && PartUpdates::read(&mut Cursor::new(&flipped)).is_ok();
+            let same =
+                read(&flipped, &scratch).is_ok() && PartUpdates::read(&mut Cursor::new(&flipped)).is_ok();
             assert!(!same, "flipped at {at}");
         }
     }
