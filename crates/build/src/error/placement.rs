@@ -255,7 +255,8 @@ impl Placement {
         new: &impl Replacement,
     ) -> f64 {
         let quantized = new.reference().quantized;
-        point.deviation(quantized, clamped(lambda), |f| new.levels(cell, f), &mut self.errors)
+        let levels = |f| new.levels(cell, f);
+        quantized.deviation_from(point.values(quantized), clamped(lambda), levels, &mut self.errors)
     }
 
     /// The points whose cells have been noted, their cells, and whether they are outside of them.

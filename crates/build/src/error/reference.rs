@@ -17,14 +17,8 @@ pub(crate) trait ReferencePoint: Copy {
     fn shortest(self, reference: &Reference<'_>) -> f64;
     /// Its region, where fields jump.
     fn region(self, reference: &Reference<'_>) -> Option<u32>;
-    /// See [`Quantized::deviation`].
-    fn deviation(
-        self,
-        quantized: &Quantized,
-        lambda: DVec3,
-        corners: impl Fn(usize) -> [i32; 4],
-        errors: &mut [f64],
-    ) -> f64;
+    /// Its values, as [`Quantized::exact`] has them.
+    fn values(self, quantized: &Quantized) -> impl Iterator<Item = f64>;
 }
 
 impl ReferencePoint for u32 {
@@ -44,14 +38,8 @@ impl ReferencePoint for u32 {
         reference.quantized.region(self)
     }
 
-    fn deviation(
-        self,
-        quantized: &Quantized,
-        lambda: DVec3,
-        corners: impl Fn(usize) -> [i32; 4],
-        errors: &mut [f64],
-    ) -> f64 {
-        quantized.deviation(self, lambda, corners, errors)
+    fn values(self, quantized: &Quantized) -> impl Iterator<Item = f64> {
+        quantized.values(self)
     }
 }
 

@@ -119,7 +119,7 @@ impl<'a> StoredPoint<'a> {
         DVec3::from_array([0, 8, 16].map(|at| self.number(first + at)))
     }
 
-    pub fn values(self) -> impl Iterator<Item = f64> + use<'a> {
+    pub fn own_values(self) -> impl Iterator<Item = f64> + use<'a> {
         let first = RecordLayout::FIXED + self.layout.moved_at_end();
         (0..self.layout.fields).map(move |f| self.number(first + 8 * f))
     }
@@ -142,14 +142,8 @@ impl ReferencePoint for StoredPoint<'_> {
         self.layout.jumps.then(|| self.own_region())
     }
 
-    fn deviation(
-        self,
-        quantized: &Quantized,
-        lambda: DVec3,
-        corners: impl Fn(usize) -> [i32; 4],
-        errors: &mut [f64],
-    ) -> f64 {
-        quantized.deviation_from(self.values(), lambda, corners, errors)
+    fn values(self, _: &Quantized) -> impl Iterator<Item = f64> {
+        self.own_values()
     }
 }
 
@@ -323,7 +317,7 @@ impl<'s> StoredPoints<'s> {
 
     /// The point with a number as it is recorded.
     pub fn record(&self, point: u32, reference: &Reference<'_>, is_outside: bool, out: &mut Vec<u8>) {
-        let RecordLayout { fields, jumps, moved } = self.layout;
+        let RecordLayout { jumps, moved, .. } = self.layout;
         let quantized = reference.quantized;
         let vertex = quantized.vertex(point);
         out.extend(self.names[vertex as usize].to_le_bytes());
@@ -336,8 +330,7 @@ impl<'s> StoredPoints<'s> {
         if moved {
             out.extend(quantized.places.at(point).to_array().iter().flat_map(|x| x.to_le_bytes()));
         }
-        let values = &quantized.exact[point as usize * fields..][..fields];
-        out.extend(values.iter().flat_map(|x| x.to_le_bytes()));
+        out.extend(quantized.values(point).flat_map(f64::to_le_bytes));
     }
 
     /// Stores records behind all others; they count from then on. Adds where they are.

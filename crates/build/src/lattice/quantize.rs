@@ -172,8 +172,13 @@ impl Quantized {
         corners: impl Fn(usize) -> [i32; 4],
         errors: &mut [f64],
     ) -> f64 {
-        let exact = &self.exact[point as usize * self.fields.len()..];
-        self.deviation_from(exact.iter().copied(), lambda, corners, errors)
+        self.deviation_from(self.values(point), lambda, corners, errors)
+    }
+
+    /// The values of a point, as they are in `exact`.
+    pub fn values(&self, point: u32) -> impl Iterator<Item = f64> {
+        let fields = self.fields.len();
+        self.exact[point as usize * fields..][..fields].iter().copied()
     }
 
     /// [`Quantized::deviation`] from the values of a point, as they are in `exact`.

@@ -109,7 +109,7 @@ impl Plan {
                 && point.shortest_edge() >= 0.0
                 && point.own_region() < regions
                 && point.own_place().is_finite()
-                && point.values().all(f64::is_finite)
+                && point.own_values().all(f64::is_finite)
         }
     }
 
