@@ -78,10 +78,13 @@ pub struct Patch {
     pub regions: Vec<u16>,
     /// Where fields jump, the levels of its vertices in each region of the patch but the first there, as in [`BaseSides`](crate::mt::BaseSides).
     pub side_levels: Vec<i32>,
+    /// How many vertices and tetrahedra it has with its updates.
+    pub room: [usize; 2],
 }
 
 impl HalfEdgeBuilder {
-    /// Without updates yet. Volumes, boxes and colours of `regions` are found at the end.
+    /// Without updates yet. Volumes, boxes and colours of `regions` are found at the end. If the updates do not come in patches, it is to
+    /// [make room](Self::make_room) for the whole.
     ///
     /// # Errors
     /// If the base mesh is not usable.
@@ -100,8 +103,7 @@ impl HalfEdgeBuilder {
         if let Some(regions) = regions {
             mt.set_regions(regions).map_err(damaged)?;
         }
-        let mut mesh = mt.start().map_err(unusable)?;
-        mesh.make_room(mt.info());
+        let mesh = mt.start().map_err(unusable)?;
         Ok(Self {
             margins: Margins::new(mt.info()),
             volumes: LevelVolumes::new(mt.info()),
@@ -124,6 +126,11 @@ impl HalfEdgeBuilder {
         })
     }
 
+    /// Makes room for the mesh with all updates, if there is memory for it.
+    pub fn make_room(&mut self) {
+        self.mesh.make_room(self.mt.info());
+    }
+
     /// Goes on with the updates of a patch, without those that wait. The patch before must have been [ended](Self::end_patch).
     ///
     /// # Errors
@@ -132,6 +139,8 @@ impl HalfEdgeBuilder {
         self.flush()?;
         self.forest = patch.forest;
         let mut mesh = CurrentMesh::new(self.mt.info(), &patch.mesh).map_err(unusable)?;
+        let [vertices, tets] = patch.room;
+        mesh.make_room_for(vertices, tets);
         mesh.name_vertices(&patch.vertices);
         let regions = self.mt.regions().map(|_| (&patch.regions[..], &patch.side_levels[..]));
         self.mesh = self.mt.marked(mesh, &patch.marks, regions);
@@ -175,6 +184,8 @@ impl HalfEdgeBuilder {
             self.reaches.end_node();
             self.regions.add_touching(&self.mesh);
         }
+        // What the next patch is made of comes before it is started: never are two there.
+        self.mesh = self.mt.start().map_err(unusable)?;
         Ok(())
     }
 

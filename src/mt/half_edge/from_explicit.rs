@@ -33,6 +33,7 @@ impl HalfEdgeMt {
         let forest = Forest::new((0..explicit.vertices()).collect(), &near, offset);
         let mut builder =
             HalfEdgeBuilder::new(info, explicit.base().clone(), marks, forest, None, page_bits)?;
+        builder.make_room();
         let mut star = Vec::new();
         for u in 0..updates {
             find_star(explicit, UpdateId(u), &mut star).ok_or(refused(u))?;

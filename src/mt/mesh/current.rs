@@ -154,6 +154,13 @@ impl CurrentMesh {
         let vertices = self.labels.len().saturating_add(updates);
         let tets = self.tets.len().saturating_add(updates.saturating_mul(super::limits::MAX_STAR));
         let tets = tets.min(usize::try_from(info.tetrahedra).unwrap_or(usize::MAX));
+        self.make_room_for(vertices, tets);
+    }
+
+    /// [`CurrentMesh::make_room`] for so many vertices and tetrahedra.
+    pub(crate) fn make_room_for(&mut self, vertices: usize, tets: usize) {
+        // What an update inserts is there before all that it removes is gone.
+        let tets = tets.saturating_add(super::limits::MAX_STAR);
         make_room(&mut self.labels, vertices);
         make_room(&mut self.positions, vertices);
         make_room(&mut self.levels, vertices.saturating_mul(self.fields));

@@ -94,8 +94,9 @@ impl<'a> Appender<'a> {
         let near: Vec<u32> = updates.near.iter().map(|&near| base.number[near as usize]).collect();
         let offset = |u: u32| offset(positions, updates.near[u as usize], updates.vertices[u as usize]);
         let forest = Forest::new(names.clone(), &near, offset);
-        let builder =
+        let mut builder =
             begin(described, (&base, [&names; 2]), updates.base_marks, (levels, sides), forest, block_bits)?;
+        builder.make_room();
         Ok(Self { builder, near: updates.near, points, len: 0, number: base.number })
     }
 

@@ -380,7 +380,7 @@ impl<'a> Assembly<'a> {
             return Err(PartsError::OtherPlan);
         }
         let vertices = Vertices::of(self.plan, &self.info, &mut piece);
-        let patch = self.patch(&piece, &vertices, &rows.vertices)?;
+        let patch = self.patch(&piece, &vertices, &rows)?;
         self.builder.start_patch(patch).map_err(BuildError::from)?;
         let Piece { points, .. } = piece;
         let reference = (&points[..], &vertices);
@@ -406,8 +406,8 @@ impl<'a> Assembly<'a> {
         Ok(Forest::of(&labels, names, starts, children))
     }
 
-    /// What is left of a node, as the MT knows it; `inserted` are the reference vertices of the node's updates.
-    fn patch(&self, piece: &Piece, vertices: &Vertices, inserted: &[u32]) -> Result<Patch, PartsError> {
+    /// What is left of a node, as the MT knows it; `rows` are the node's updates.
+    fn patch(&self, piece: &Piece, vertices: &Vertices, rows: &UpdateRows) -> Result<Patch, PartsError> {
         let fields = self.info.fields.len();
         let mut used: Vec<u32> = piece.tets.iter().flatten().copied().collect();
         used.sort_unstable();
@@ -438,7 +438,11 @@ impl<'a> Assembly<'a> {
             side_levels = further.flat_map(|(v, region)| at(used[v as usize], region)).copied().collect();
         }
         let forest =
-            self.forest(used.iter().map(|&v| piece.points[v as usize]).chain(inserted.iter().copied()))?;
+            self.forest(used.iter().map(|&v| piece.points[v as usize]).chain(rows.vertices.iter().copied()))?;
+        // What is left of the node is removed but for what is of the reference mesh.
+        let stays = |code: &&RemoverCode| !matches!(Remover::from(**code), Remover::Own(_));
+        let stay = marks.iter().filter(|mark| mark.remover == NONE).count();
+        let room = [used.len() + rows.vertices.len(), stay + rows.removers.iter().filter(stays).count()];
         let positions = used.iter().map(|&v| piece.positions[v as usize]).collect();
         let vertices = used.iter().map(|&v| self.number[piece.points[v as usize] as usize]).collect();
         Ok(Patch {
@@ -448,6 +452,7 @@ impl<'a> Assembly<'a> {
             marks,
             regions,
             side_levels,
+            room,
         })
     }
 
