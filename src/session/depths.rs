@@ -6,20 +6,26 @@
 //! the same as in the whole MT. Depths never change, so this is done only for meshes with updates that no
 //! mesh before had.
 
-use crate::mt::{ApplyUpdates, ReplayError, UpdateId, apply_next};
+use crate::mt::{ApplyUpdates, PagedArray, ReplayError, UpdateId, apply_next};
 use crate::refine::Front;
 
 /// Depths of updates.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Depths {
     /// For each update the updates on the longest path to it, itself included; 0 where that is not known.
-    of: Vec<u32>,
+    of: PagedArray<u32>,
+}
+
+impl Default for Depths {
+    fn default() -> Self {
+        Self { of: PagedArray::new(0) }
+    }
 }
 
 impl Depths {
     /// The depth of an update; 0 without one.
     pub fn get(&self, u: Option<UpdateId>) -> u32 {
-        u.and_then(|u| self.of.get(u.0 as usize)).copied().unwrap_or(0)
+        u.map_or(0, |u| self.of.get(u.0))
     }
 
     /// Finds the depths of all updates that are applied. Takes as long as applying them, if some are not
@@ -28,7 +34,6 @@ impl Depths {
     /// # Errors
     /// If the MT is damaged.
     pub fn learn(&mut self, mt: &impl ApplyUpdates, front: &Front) -> Result<(), ReplayError> {
-        self.of.resize(self.of.len().max(mt.updates() as usize), 0);
         let mut applied = (0..mt.updates()).map(UpdateId).filter(|u| front.contains(*u));
         if applied.all(|u| self.get(Some(u)) > 0) {
             return Ok(());
@@ -38,7 +43,7 @@ impl Depths {
         for u in (0..mt.updates()).map(UpdateId).filter(|u| front.contains(*u)) {
             let removed = mt.find_removed(&mut mesh, u)?;
             let above = removed.iter().map(|&t| self.get(mt.creator(&mesh, t))).max();
-            self.of[u.0 as usize] = above.unwrap_or(0) + 1;
+            self.of.set(u.0, above.unwrap_or(0) + 1);
             apply_next(mt, &mut mesh, u)?;
         }
         Ok(())
