@@ -13,8 +13,8 @@ use tetralod_build::parts::PartsError;
 use tetralod_build::{BuildConfig, mark_labels};
 use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
 
-/// Endings of files that are read by ranges of cells.
-const BY_RANGES: [&str; 3] = ["vtu", "vtkhdf", "hdf"];
+/// Endings of files that are read by ranges of cells, and of grids that are read by boxes.
+const BY_RANGES: [&str; 10] = ["vtu", "vtkhdf", "hdf", "vti", "raw", "json", "nrrd", "nhdr", "mha", "mhd"];
 
 impl BuildOptions {
     /// Tells what was repaired, and what was found.

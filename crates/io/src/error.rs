@@ -219,6 +219,19 @@ pub(super) enum Stop {
     Read(ReadError),
 }
 
+impl Stop {
+    /// The error where a file that could be read by parts was changed since.
+    pub fn as_changed(self) -> ReadError {
+        match self {
+            Self::Read(error) => error,
+            Self::Whole(why) => {
+                let reason = ReadReason::Io(format!("it has changed: {why}"));
+                ReadError { file: String::new(), place: String::new(), reason }
+            }
+        }
+    }
+}
+
 impl From<ReadReason> for Stop {
     fn from(reason: ReadReason) -> Self {
         Self::Read(ReadError { file: String::new(), place: String::new(), reason })

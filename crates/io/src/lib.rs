@@ -56,6 +56,7 @@ mod formats;
 pub mod generate;
 mod ghosts;
 mod grid;
+mod grid_boxes;
 mod grid_parts;
 mod image;
 mod in_memory;
@@ -74,6 +75,7 @@ mod pvtu;
 mod ranges;
 mod raw;
 mod reading;
+mod sample_file;
 mod scanner;
 mod shared_points;
 mod shares;
@@ -90,6 +92,7 @@ mod vtu_ranges;
 mod write;
 mod write_layers;
 mod xml;
+mod xml_on_disk;
 mod xz;
 #[cfg(feature = "zarr")]
 mod zarr;
@@ -97,6 +100,8 @@ mod zarr;
 #[doc(hidden)]
 pub use contents::{PieceCounts, Survey};
 pub use error::{ReadError, ReadReason};
+#[doc(hidden)]
+pub use grid_boxes::GridInParts;
 pub use in_memory::FilesInMemory;
 pub use memory::MemoryLimit;
 pub use options::{CellData, ReadOptions};
@@ -118,9 +123,6 @@ pub use write::{MeshArray, cell_arrays, point_arrays};
 pub use write::{write_vti, write_vtu};
 #[doc(hidden)]
 pub use write_layers::write_vti_layers;
-#[cfg(feature = "zarr")]
-#[doc(hidden)]
-pub use zarr::GridInParts;
 
 use std::path::Path;
 

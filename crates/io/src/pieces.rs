@@ -15,15 +15,18 @@ use crate::file_kind::without_mark;
 use crate::formats::exodus_pieces::{Decomposition, ExodusPieces};
 #[cfg(feature = "hdf5")]
 use crate::formats::vtkhdf_ranges::HdfFile;
+use crate::grid_boxes::GridInParts;
+use crate::image::ImageFile;
 use crate::listed::{for_each_file, names};
 use crate::pvtu::{Identity, bits};
 use crate::ranges::{Each, InPieces};
+use crate::sample_file::SampleFile;
 use crate::shared_points::{SharedPoints, hash};
 use crate::vtu::PieceReader;
 use crate::vtu_ranges::VtuFile;
 use crate::xml::Document;
 #[cfg(feature = "zarr")]
-use crate::zarr::{self, GridInParts};
+use crate::zarr;
 use crate::{CellData, PieceCounts, ReadOptions, packed};
 use tetralod::mesh::MeshPiece;
 
@@ -42,8 +45,7 @@ enum Content {
     List(Vec<u8>),
     /// In this one.
     File(Box<dyn InPieces>),
-    /// In the chunks of arrays.
-    #[cfg(feature = "zarr")]
+    /// In boxes of a grid.
     Grid(Box<GridInParts>),
 }
 
@@ -100,7 +102,6 @@ impl Pieces {
     }
 
     /// The regular grid that is read in boxes, of which no pieces come.
-    #[cfg(feature = "zarr")]
     pub fn grid(&self) -> Option<&GridInParts> {
         if let Content::Grid(grid) = &self.content { Some(grid) } else { None }
     }
@@ -124,7 +125,6 @@ impl Pieces {
         let list = match &self.content {
             Content::List(list) => list,
             Content::File(file) => return Ok(file.counts()),
-            #[cfg(feature = "zarr")]
             Content::Grid(grid) => {
                 let ([points, tetrahedra], fields) = (grid.mesh().counts(), grid.mesh().fields.len() as u64);
                 return Ok(PieceCounts { points, tetrahedra, pieces: 1, fields, ..PieceCounts::default() });
@@ -187,17 +187,9 @@ impl Pieces {
         let read = match &self.content {
             Content::List(list) => return self.read_listed(&Document::parse(without_mark(list))?, each),
             Content::File(file) => file.for_each(&self.options, each),
-            #[cfg(feature = "zarr")]
             Content::Grid(_) => Err(Stop::Whole("it is a grid")),
         };
-        read.map_err(|stop| match stop {
-            Stop::Read(error) => error,
-            // It was not so when it was opened.
-            Stop::Whole(why) => {
-                let reason = ReadReason::Io(format!("it has changed: {why}"));
-                ReadError { file: String::new(), place: String::new(), reason }
-            }
-        })
+        read.map_err(Stop::as_changed)
     }
 
     fn read_listed(&self, document: &Document<'_>, each: Each<'_>) -> Result<(), ReadError> {
@@ -256,6 +248,14 @@ impl Content {
         #[cfg(feature = "hdf5")]
         if let Some(file) = HdfFile::open(path, options, most)? {
             return Ok(Some(Self::File(Box::new(file))));
+        }
+        let grid = match ImageFile::open(path, options)? {
+            Some(grid) => Some(grid),
+            None => SampleFile::open(path, options)?,
+        };
+        // Without values, its reader says what is missing.
+        if let Some(grid) = grid.filter(|grid| !grid.mesh().fields.is_empty()) {
+            return Ok(Some(Self::Grid(Box::new(grid))));
         }
         let file = VtuFile::open(path, options, most)?;
         Ok(file.filter(|file| file.ranges().count() > 1).map(|file| Self::File(Box::new(file))))

@@ -8,7 +8,7 @@
 use serde_json::Value;
 
 use crate::error::{ReadReason, expect_count};
-use crate::grid::{self, GridValues};
+use crate::grid::{self, GridValues, Placement};
 use crate::number::NumberType;
 use crate::{MemoryLimit, Survey};
 use tetralod::mesh::{Field, Grid, TetMesh};
@@ -20,6 +20,7 @@ const KEYS: [&str; 8] = ["dims", "type", "file", "endian", "spacing", "origin", 
 const REMARKS: [&str; 6] = ["name", "description", "source", "license", "range", "order"];
 
 /// What a sidecar says.
+#[derive(Debug)]
 pub(super) struct Sidecar {
     /// Name of the file with the samples, without a folder; `None` if it is named like the sidecar.
     pub file: Option<String>,
@@ -80,13 +81,30 @@ impl Sidecar {
         let points: u64 = self.grid.dims.iter().map(|d| u64::from(*d)).product();
         expect_count("bytes of samples", points * self.number.size() as u64, samples.len())?;
         memory.take(8 * points)?;
+        grid::grid_mesh(self.grid, self.values(samples), memory)
+    }
+
+    /// Bytes of a sample.
+    pub fn size(&self) -> usize {
+        self.number.size()
+    }
+
+    /// Where they are.
+    pub fn placement(&self) -> Placement {
+        let Grid { dims, origin, spacing: [x, y, z] } = self.grid;
+        let steps = [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]];
+        Placement { dims: dims.map(u64::from), origin, steps }
+    }
+
+    /// What these samples are.
+    pub fn values(&self, samples: &[u8]) -> GridValues {
         let values = self.number.floats(samples, self.big);
         let field = Field {
             unit: self.unit.clone(),
             integer: self.number.is_integer(),
             ..Field::new(self.field.clone(), values)
         };
-        grid::grid_mesh(self.grid, GridValues { fields: vec![field], ..GridValues::default() }, memory)
+        GridValues { fields: vec![field], ..GridValues::default() }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Reading a file of any kind, and those that it needs.
 
+use std::path::PathBuf;
+
 use crate::beside::{FilesOf, Source};
 use crate::error::{At, ReadError, ReadReason, in_file};
 use crate::file_kind::{lower_extension, without_gz, without_mark};
@@ -91,13 +93,18 @@ fn read_in(
 
 fn read_raw_by_sidecar(files: &FilesOf<'_>, memory: &MemoryLimit) -> Result<TetMesh, ReadError> {
     let sidecar = sidecar(files)?;
-    let samples_path = match &sidecar.file {
+    let samples_path = samples_path(files, &sidecar);
+    let samples = files.load_one(&samples_path)?;
+    sidecar.mesh(&samples, memory).in_file(&samples_path.display().to_string())
+}
+
+/// Where the samples are of which a sidecar tells.
+pub(super) fn samples_path(files: &FilesOf<'_>, sidecar: &raw::Sidecar) -> PathBuf {
+    match &sidecar.file {
         _ if lower_extension(files.given) == "raw" => files.given.to_owned(),
         Some(file) => files.given.with_file_name(file),
         None => files.given.with_extension("raw"),
-    };
-    let samples = files.load_one(&samples_path)?;
-    sidecar.mesh(&samples, memory).in_file(&samples_path.display().to_string())
+    }
 }
 
 /// The sidecar of raw samples, of which either is given.

@@ -1,32 +1,24 @@
 //! VTK XML unstructured grids by ranges of cells: what the file is on a disk is read by parts, but for its XML text.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
 
 use crate::cells::Indices;
 use crate::error::{At, ReadError, ReadReason, Stop};
 use crate::fields::{Collector, set_time};
-use crate::file_kind::without_mark;
-use crate::ghosts::{GHOST_LEVELS, GHOST_TYPE};
 use crate::number::points_from;
 use crate::ranges::{Before, Each, Grid, InPieces, Ranges, Rows};
-use crate::skeleton::{Skeleton, left_in_file};
-use crate::stored::{Bytes, Stored};
+use crate::stored::Stored;
 use crate::vtu::{PieceReader, readers};
-use crate::xml::{Array, Document, Place};
-use crate::{CellData, PieceCounts, ReadOptions, format_of, packed};
+use crate::xml::Array;
+use crate::xml_on_disk::{XmlFile, expect_no_ghosts};
+use crate::{CellData, PieceCounts, ReadOptions};
 use tetralod::mesh::{MeshInput, TetMesh};
-
-/// Bytes that are read at a time where all are passed over.
-const STEP: usize = 1 << 20;
 
 /// A file whose text was read.
 #[derive(Debug)]
 pub(super) struct VtuFile {
-    file: File,
-    skeleton: Skeleton,
+    xml: XmlFile,
     /// Those of each of its pieces.
     pieces: Vec<Ranges>,
     points: u64,
@@ -36,22 +28,9 @@ pub(super) struct VtuFile {
 impl VtuFile {
     /// Opens a file whose ranges become so many tetrahedra at most, or as many as take the least memory; none if it is another one.
     pub fn open(path: &Path, options: &ReadOptions, most: Option<u64>) -> Result<Option<Self>, Stop> {
-        let io_error = |error: std::io::Error| ReadReason::Io(error.to_string());
-        let file = File::open(path).map_err(io_error)?;
-        // Pipes and the like are read once.
-        if !file.metadata().map_err(io_error)?.is_file() {
-            return Ok(None);
-        }
-        let skeleton = {
-            let mut reader = BufReader::with_capacity(STEP, &file);
-            let head = std::io::BufRead::fill_buf(&mut reader).map_err(io_error)?;
-            if packed::is_gzip(head) || format_of(head) != Some("vtu") {
-                return Ok(None);
-            }
-            Skeleton::read(reader)?
-        };
-        let mut opened = Self { file, skeleton, pieces: Vec::new(), points: 0, fields: 0 };
-        let document = opened.document()?;
+        let Some(xml) = XmlFile::open(path, "vtu")? else { return Ok(None) };
+        let mut opened = Self { xml, pieces: Vec::new(), points: 0, fields: 0 };
+        let document = opened.xml.document()?;
         let (mut pieces, mut points, mut fields) = (Vec::new(), 0, 0);
         for reader in readers(&document, options) {
             let grid = opened.grid(&reader)?;
@@ -71,62 +50,16 @@ impl VtuFile {
         self.pieces.iter().flat_map(|piece| &piece.ranges)
     }
 
-    fn document(&self) -> Result<Document<'_>, ReadError> {
-        Document::parse(without_mark(&self.skeleton.text))
-    }
-
-    /// The time of the data set, as [`Document::time`].
-    fn time(&self, document: &Document<'_>) -> Option<f64> {
-        let array = document.time_array()?;
-        let time = match self.stored(document, array, 1) {
-            Ok(stored) => stored.floats(0..1).ok()?.first().copied(),
-            Err(_) => document.time(),
-        };
-        time.filter(|time| time.is_finite())
-    }
-
-    /// Opens an array of so many numbers.
-    fn stored<'a>(
-        &'a self,
-        document: &'a Document<'_>,
-        array: &'a Array<'_>,
-        count: u64,
-    ) -> Result<Stored<'a>, Stop> {
-        let open = || {
-            let Some(number) = array.number_type() else {
-                return Err(Stop::Whole("an array that is needed has no numbers"));
-            };
-            let file = &self.file;
-            let bytes = match document.place_of(array)? {
-                Place::Numbers => return Err(Stop::Whole("its numbers are text")),
-                Place::Inline(text) => match left_in_file(text) {
-                    Some((start, end)) => (Bytes::File { file, start, end }, true, true),
-                    None => (Bytes::Memory(text.trim_ascii().as_bytes()), true, true),
-                },
-                Place::Appended { offset, base64 } => {
-                    let end = file.metadata().map_err(|error| ReadReason::Io(error.to_string()))?.len();
-                    let start = self.skeleton.data.saturating_add(offset).min(end);
-                    (Bytes::File { file, start, end }, base64, false)
-                }
-            };
-            Stored::open(bytes, document.framing, number, count)
-        };
-        open().map_err(|stop| stop.at(|| array.place()))
-    }
-
     fn grid<'a>(&'a self, reader: &'a PieceReader<'a, 'a>) -> Result<VtuGrid<'a>, Stop> {
         let count =
             |name: &str| reader.piece.attributes.count(name).map(|count| count as u64).at(|| reader.place());
         let counts = [count("NumberOfPoints")?, count("NumberOfCells")?];
-        let marks = ["PointData", "CellData"].into_iter().flat_map(|section| reader.piece.section(section));
-        if marks.into_iter().any(|array| [GHOST_TYPE, GHOST_LEVELS].contains(&array.name())) {
-            return Err(Stop::Whole("it marks cells or points as ghosts"));
-        }
+        expect_no_ghosts(reader)?;
         if counts.contains(&0) {
             return Err(Stop::Whole("it has no cells"));
         }
         let open = |array: &'a Array<'a>, count: u64| {
-            let stored = self.stored(reader.document, array, count);
+            let stored = self.xml.stored(reader.document, array, count);
             stored.map(|stored| Of { array, stored })
         };
         let [points, cells] = counts;
@@ -161,8 +94,8 @@ impl InPieces for VtuFile {
     }
 
     fn for_each(&self, options: &ReadOptions, each: Each<'_>) -> Result<(), Stop> {
-        let document = self.document()?;
-        let time = self.time(&document);
+        let document = self.xml.document()?;
+        let time = self.xml.time(&document);
         let mut before = Before::default();
         for (reader, ranges) in readers(&document, options).zip(&self.pieces) {
             let grid = self.grid(&reader)?;
@@ -231,7 +164,7 @@ impl Grid for VtuGrid<'_> {
         let Self { file, reader, counts, .. } = self;
         let read = &mut |array: &Array<'_>, components: usize| {
             let count = counts[0].saturating_mul(components as u64);
-            let stored = file.stored(reader.document, array, count)?;
+            let stored = file.xml.stored(reader.document, array, count)?;
             rows_of(&stored, rows, components).map_err(|reason| Stop::from(reason).at(|| array.place()))
         };
         let [fields, other_fields] = reader.collect_by(Collector::new(options), "PointData", read)?;

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 
 use crate::error::{At, ReadError, ReadReason, shown};
 use crate::formats::volume::{
-    Axis, MAX_COMPONENTS, SampleArray, Volume, first, from_files, from_text, numbered_files, numbers, three,
-    unpacked, wrong_dimensions,
+    Axis, MAX_COMPONENTS, SampleArray, Start, Volume, first, from_files, from_text, numbered_files, numbers,
+    three, unpacked, wrong_dimensions,
 };
 use crate::number::NumberType;
 use crate::options::{Beside, ReadOptions};
@@ -39,6 +39,24 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
         from_files(("ElementDataFile", &names), expected, beside, samples)?
     };
     volume.mesh(&samples, options).at(|| "samples".into())
+}
+
+/// As [`nrrd::in_file`](super::nrrd::in_file).
+pub(super) fn in_file(head: &[u8]) -> Option<(Volume, Option<String>, Start)> {
+    let (header, rest) = read_header(head).ok()?;
+    let volume = header.volume().ok()?;
+    let names = header.files(rest, volume.dims).ok()?;
+    if header.compressed || header.is_text || names.len() > 1 {
+        return None;
+    }
+    let before = if names.is_empty() { head.len() - rest.len() } else { 0 } as u64;
+    let start = match u64::try_from(header.skipped) {
+        Ok(0) => Start::At(before),
+        // Counted from the beginning of the file.
+        Ok(skipped) => Start::At(skipped),
+        Err(_) => Start::BeforeEnd(0),
+    };
+    Some((volume, names.into_iter().next(), start))
 }
 
 /// The names of the files with the samples.

@@ -28,7 +28,7 @@ mod metaimage;
 mod netgen;
 mod nrrd;
 pub(super) mod tetgen;
-mod volume;
+pub(super) mod volume;
 #[cfg(feature = "hdf5")]
 mod vtkhdf;
 #[cfg(feature = "hdf5")]
@@ -38,6 +38,7 @@ use std::path::Path;
 
 use crate::beside::FilesOf;
 use crate::error::ReadError;
+use crate::formats::volume::{Start, Volume};
 use crate::options::{Beside, ReadOptions};
 use crate::scanner::Scanner;
 use tetralod::mesh::TetMesh;
@@ -116,6 +117,16 @@ pub(super) fn read(
         Format::Nrrd => nrrd::read(bytes, options, beside),
         Format::MetaImage => metaimage::read(bytes, options, beside),
     })
+}
+
+/// The samples that stand in a file as they are, which begins with these bytes: the name of another file that has them, and where there; none if
+/// they do not.
+pub(super) fn samples_in_file(head: &[u8]) -> Option<(Volume, Option<String>, Start)> {
+    match Format::of(head)? {
+        Format::Nrrd => nrrd::in_file(head),
+        Format::MetaImage => metaimage::in_file(head),
+        _ => None,
+    }
 }
 
 /// The times of the steps in the given file; fewer than two if it is of no format that is known to have some.

@@ -7,8 +7,8 @@ use std::borrow::Cow;
 
 use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::formats::volume::{
-    Axis, MAX_COMPONENTS, SampleArray, Volume, first, from_files, from_text, last_unpacked, numbered_files,
-    numbers, unpacked, wrong_dimensions,
+    Axis, MAX_COMPONENTS, SampleArray, Start, Volume, first, from_files, from_text, last_unpacked,
+    numbered_files, numbers, unpacked, wrong_dimensions,
 };
 use crate::number::NumberType;
 use crate::options::{Beside, ReadOptions};
@@ -66,6 +66,22 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> R
 /// The names of the files with the samples.
 pub(super) fn named_by(bytes: &[u8]) -> Vec<String> {
     read_header(bytes).map_or_else(|_| Vec::new(), |(header, _)| header.files)
+}
+
+/// The samples that stand in a file as they are, which begins with these bytes: the name of another file that has them, and where there; none if
+/// they do not.
+pub(super) fn in_file(head: &[u8]) -> Option<(Volume, Option<String>, Start)> {
+    let (header, rest) = read_header(head).ok()?;
+    let volume = header.volume().ok()?;
+    if header.encoding != "raw" || header.line_skip > 0 || header.files.len() > 1 {
+        return None;
+    }
+    let before = if header.files.is_empty() { head.len() - rest.len() } else { 0 } as u64;
+    let start = match u64::try_from(header.byte_skip) {
+        Ok(skip) => Start::At(before + skip),
+        Err(_) => Start::BeforeEnd(header.byte_skip.saturating_add(1).unsigned_abs()),
+    };
+    Some((volume, header.files.into_iter().next(), start))
 }
 
 /// The header, which an empty line ends, and what follows.

@@ -16,7 +16,7 @@ const MAX_FILES: u64 = 1 << 16;
 
 /// What a header says of the samples that follow.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Volume {
+pub(crate) struct Volume {
     pub dims: [u64; 3],
     /// All axes of the file, fastest first.
     pub axes: Vec<Axis>,
@@ -33,9 +33,27 @@ pub(super) struct Volume {
     pub notes: Vec<String>,
 }
 
+/// Where the samples begin in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Start {
+    At(u64),
+    /// So many bytes stand behind them.
+    BeforeEnd(u64),
+}
+
+impl Start {
+    /// In a file of so many bytes, of which so many are samples.
+    pub fn of(self, all: u64, samples: u64) -> u64 {
+        match self {
+            Self::At(start) => start,
+            Self::BeforeEnd(behind) => all.saturating_sub(samples.saturating_add(behind)),
+        }
+    }
+}
+
 /// An axis of the samples in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     pub size: u64,
     /// Whether a step along it leads to another sample, and not to another value of the same.
     pub is_space: bool,
@@ -43,7 +61,7 @@ pub(super) struct Axis {
 
 /// Some of the values of each sample as one array.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct SampleArray {
+pub(crate) struct SampleArray {
     /// What its name ends with, behind that of the field.
     pub ending: &'static str,
     /// Which of the values of a sample each component is.
@@ -95,6 +113,33 @@ impl Volume {
         expect_count("bytes of samples", self.bytes()?, samples.len())?;
         let numbers = (samples.len() / self.number.size()) as u64;
         let _held = options.memory.hold(8 * numbers)?;
+        let mesh = self.placement().mesh(self.values(samples, options)?, &options.memory)?;
+        Ok(TetMesh { notes: self.notes.clone(), ..mesh })
+    }
+
+    pub fn placement(&self) -> Placement {
+        Placement { dims: self.dims, origin: self.origin, steps: self.steps }
+    }
+
+    /// Whether the samples of points that follow one another do so in the file.
+    pub fn is_by_points(&self) -> bool {
+        self.axes.iter().rev().take(3).all(|axis| axis.is_space)
+    }
+
+    /// So many points in a row, where samples are [by points](Self::is_by_points).
+    pub fn row(&self, points: u64) -> Self {
+        let mut row = self.clone();
+        row.dims = [points, 1, 1];
+        row.axes
+            .iter_mut()
+            .filter(|axis| axis.is_space)
+            .zip(row.dims)
+            .for_each(|(axis, size)| axis.size = size);
+        row
+    }
+
+    /// What these samples are.
+    pub fn values(&self, samples: &[u8], options: &ReadOptions) -> Result<GridValues, ReadReason> {
         let mut fields = Collector::new(options);
         let mut values = Vec::new();
         for array in &self.arrays {
@@ -108,10 +153,7 @@ impl Volume {
         }
         fields.others.iter_mut().for_each(|field| field.unit.clone_from(&self.unit));
         let others = [fields.others, Vec::new()];
-        let values = GridValues { fields: fields.fields, others, ..GridValues::default() };
-        let mesh = Placement { dims: self.dims, origin: self.origin, steps: self.steps }
-            .mesh(values, &options.memory)?;
-        Ok(TetMesh { notes: self.notes.clone(), ..mesh })
+        Ok(GridValues { fields: fields.fields, others, ..GridValues::default() })
     }
 }
 

@@ -19,9 +19,9 @@ use std::path::Path;
 use crate::ReadOptions;
 use crate::beside::{FilesOf, Source};
 use crate::error::{ReadError, Stop, in_file};
+use crate::grid_boxes::GridInParts;
 use crate::memory::MemoryLimit;
 use tetralod::mesh::TetMesh;
-pub use volume::GridInParts;
 use volume::Volume;
 
 /// What one of the objects in a folder with an array or a group is called.

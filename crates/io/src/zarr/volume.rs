@@ -11,6 +11,7 @@ use crate::ReadOptions;
 use crate::error::{At, ReadError, ReadReason, expect_count};
 use crate::fields::Collector;
 use crate::grid::{self, GridValues, Placement, rectilinear};
+use crate::grid_boxes::{Boxes, GridInParts, Points};
 use crate::memory::MemoryLimit;
 use crate::number::points_from;
 use crate::zarr::array::{Samples, shown};
@@ -26,8 +27,8 @@ const FIELD: &str = "value";
 /// How far coordinates that count as evenly spaced are from that, beside the distance between two: single precision has not more.
 const EVEN: f64 = 1e-3;
 
-/// Most values of a field that are read at once where all of them pass by.
-const MOST_IN_SLAB: u64 = 1 << 24;
+/// Most values of a field that are read at once where all of them pass by, for the sake of whole chunks.
+const MOST_IN_CHUNKS: u64 = 1 << 24;
 
 /// Arrays on one grid.
 #[derive(Debug)]
@@ -154,9 +155,9 @@ impl Volume {
             self.collect(options, &|_, _, _| Ok(Vec::new()))?;
         let mut input = MeshInput { other_fields, ..MeshInput::default() };
         input.files.0.push(path.to_owned());
-        let mesh =
-            TetMesh { grid: Some(grid), fields, input, notes: self.notes.clone(), ..TetMesh::default() };
-        Ok(Ok(GridInParts { volume: self, mesh, of_fields, step: options.step as u64 }))
+        let mesh = TetMesh { fields, input, notes: self.notes.clone(), ..TetMesh::default() };
+        let boxes = OfFields { volume: self, of_fields, step: options.step as u64 };
+        Ok(Ok(GridInParts::new(mesh, grid, Box::new(boxes))))
     }
 
     /// The time of the step that is wanted; none if there is one step.
@@ -166,23 +167,18 @@ impl Volume {
     }
 }
 
-/// A volume on a regular grid of which boxes are read.
+/// The fields of a volume of which boxes are read.
 #[derive(Debug)]
-pub struct GridInParts {
+struct OfFields {
     volume: Volume,
-    mesh: TetMesh,
+    /// In which array each is, and in which channel.
     of_fields: Vec<(usize, u64)>,
     step: u64,
 }
 
-impl GridInParts {
-    /// The grid alone, with the fields without values.
-    pub fn mesh(&self) -> &TetMesh {
-        &self.mesh
-    }
-
-    /// Layers of points across z that are best read together: those of chunks, if they are not too thick.
-    pub fn layers(&self) -> u32 {
+impl Boxes for OfFields {
+    /// Those of chunks, if they are not too thick.
+    fn layers(&self) -> u32 {
         let [nx, ny, _] = self.volume.dims;
         let of_chunks = |(array, _): &(usize, u64)| {
             let OnGrid { samples, axes, .. } = &self.volume.arrays[*array];
@@ -190,26 +186,13 @@ impl GridInParts {
         };
         let layers = self.of_fields.iter().map(of_chunks).max().unwrap_or(1);
         // No more points than a grid may have.
-        layers.min(MOST_IN_SLAB / (nx * ny)).max(1) as u32
+        layers.min(MOST_IN_CHUNKS / (nx * ny)).max(1) as u32
     }
 
-    /// The finite values of a field, by its number, at the points in a box, x fastest.
-    ///
-    /// # Errors
-    /// If they cannot be read.
-    pub fn values(&self, field: usize, points: [Range<u32>; 3]) -> Result<Vec<f64>, ReadError> {
+    fn values(&self, field: usize, points: &Points) -> Result<Vec<f64>, ReadError> {
         let (array, channel) = self.of_fields[field];
         let range = points.clone().map(|range| range.start.into()..range.end.into());
-        let values = self.volume.arrays[array].values([self.step, channel], range)?;
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            let [nx, ny, _] = self.volume.dims;
-            let [across, rows, _] = points.clone().map(|range| range.len());
-            let [x, y, z] = [at % across, at / across % rows, at / (across * rows)];
-            let [x, y, z] = [(x, 0), (y, 1), (z, 2)].map(|(at, k)| at as u64 + u64::from(points[k].start));
-            let array = self.mesh.fields[field].name.clone();
-            return Err(ReadReason::NotFinite { array, point: x + nx * (y + ny * z) }).at(String::new);
-        }
-        Ok(values)
+        self.volume.arrays[array].values([self.step, channel], range)
     }
 }
 

@@ -13,6 +13,8 @@ mod exodus;
 mod exodus_pieces;
 mod fields;
 mod files;
+#[cfg(not(target_arch = "wasm32"))]
+mod grid_boxes;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(not(target_arch = "wasm32"))]

@@ -217,7 +217,7 @@ fn errors_are_those_of_the_whole() {
     data.1.push(Array::new("CellData", "vtkGhostType", "UInt8", 1, &[0.0; 12]));
     let path = folder.write("b.vtu", &xml(RAW, "UnstructuredGrid", "", &[data]));
     assert_eq!(pieces(&path, 5), Ok(Err(Some("it marks cells or points as ghosts"))));
-    for (name, bytes) in [("c.vtu", gzip(&sample_vtu(RAW))), ("d.vtu", sample_vti(RAW))] {
+    for (name, bytes) in [("c.vtu", gzip(&sample_vtu(RAW))), ("d.vtu", sample_vtr(RAW))] {
         assert_eq!(pieces(&folder.write(name, &bytes), 5), Ok(Err(None)), "{name}");
     }
     assert!(pieces(&folder.0.join("none.vtu"), 5).is_err());

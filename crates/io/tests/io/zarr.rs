@@ -6,11 +6,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::grid_boxes::parts_of;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use tetralod::mesh::TetMesh;
-use tetralod_build::parts::{self, GridValues, Part, PartsError, Plan, PointBox};
-use tetralod_build::{BuildConfig, FieldPrecision, mark_labels};
+use tetralod_build::{BuildConfig, FieldPrecision};
 use tetralod_io::{self as io, Pieces, ReadOptions, ReadReason};
 use zarrs::array::{Array, ArrayBytes, ArrayMetadata};
 use zarrs::storage::store::MemoryStore;
@@ -165,12 +165,6 @@ fn all_ways() -> Vec<(String, Value)> {
 
 /// The bytes of a number in some type.
 type ToBytes<'a> = &'a dyn Fn(u16) -> Vec<u8>;
-
-/// Takes a part.
-type PutPart<'a> = &'a mut dyn FnMut(Part) -> Result<(), PartsError>;
-
-/// Parts a volume.
-type Parting<'a> = &'a dyn Fn(PutPart<'_>) -> Result<Plan, PartsError>;
 
 #[test]
 fn all_versions_codecs_orders_and_shards_give_the_same_mesh() {
@@ -555,7 +549,11 @@ fn boxes_are_read_without_the_chunks_beside_them() {
         }
         read.insert(name, grid.layers());
     }
-    assert_eq!((read["3-plain.zarr"], read["3-shards.zarr"]), (2, 1), "as thick as chunks");
+    assert_eq!(
+        (read["3-plain.zarr"], read["3-shards.zarr"]),
+        (4, 5),
+        "as many chunks as there are whole, and all layers"
+    );
     // What is beside a box may be damaged.
     folder.write("3-plain.zarr/c/2/1/1", "");
     let pieces = Pieces::open_ranges(&folder.path("3-plain.zarr"), &ReadOptions::default(), None);
@@ -605,32 +603,6 @@ fn boxes_at_the_end_of_a_grid_of_as_many_samples_as_have_numbers() {
     let said = refused.expect_err("too many samples").to_string();
     let words = "more than 4294967294 grid points (there are 4096 x 4096 x 4096; one of 3 along each axis would be 1366 x 1366 x 1366)";
     assert!(said.contains("larger.zarr") && said.contains(words), "{said}");
-}
-
-/// The parts of a volume, as bytes: of all values, and of values that are read for each part.
-fn parts_of(path: &Path, config: &BuildConfig, count: u32) -> [Result<Vec<Vec<u8>>, String>; 2] {
-    let collect = |part: Parting<'_>| {
-        let mut all = Vec::new();
-        let plan = part(&mut |part| {
-            let mut bytes = Vec::new();
-            part.write(&mut bytes)?;
-            all.push(bytes);
-            Ok(())
-        });
-        plan.map(|_| all).map_err(|error| error.to_string())
-    };
-    let mut mesh = io::read_unexpanded(path, &ReadOptions::default()).expect("a mesh");
-    mark_labels(&mut mesh, &[], config).expect("labels");
-    let pieces =
-        Pieces::open_ranges(path, &ReadOptions::default(), None).expect("no error").expect("in parts");
-    let grid = pieces.grid().expect("a grid");
-    let read = |field: usize, points: PointBox| grid.values(field, points).map_err(PartsError::other);
-    let values = GridValues { mesh: grid.mesh().clone(), layers: grid.layers(), read: &read };
-    let prepare = |mesh: &mut TetMesh| Ok(mark_labels(mesh, &[], config)?);
-    [
-        collect(&|put| parts::part(&mesh, config, count, BTreeMap::new(), put)),
-        collect(&|put| parts::part_grid(&values, &prepare, config, count, BTreeMap::new(), put)),
-    ]
 }
 
 #[test]
