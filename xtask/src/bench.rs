@@ -8,13 +8,14 @@ use serde_json::Value;
 use crate::serve::Server;
 use crate::{
     bench_against_vtk, bench_beside_vtk, bench_build, bench_first_visit, bench_format, bench_kinds,
-    bench_network, bench_pictures, browser, demo, package, shell,
+    bench_network, bench_parts, bench_pictures, browser, demo, package, shell,
 };
 
 /// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With other options what `cargo xtask` says of them.
 pub fn run(args: &[String]) -> Result<()> {
     match args {
         [option, rest @ ..] if option == "--build" => return bench_build::run(rest),
+        [option, rest @ ..] if option == "--parts" => return bench_parts::run(rest),
         [option, rest @ ..] if option == "--network" => return bench_network::run(rest),
         [option, rest @ ..] if option == "--against-vtk" => return bench_against_vtk::run(rest),
         [option, rest @ ..] if option == "--beside-vtk" => return bench_beside_vtk::run(rest),
@@ -33,7 +34,7 @@ pub fn run(args: &[String]) -> Result<()> {
             path if !path.starts_with('-') && file.is_none() => file = Some(PathBuf::from(path)),
             other => {
                 bail!(
-                    "`bench` knows one FILE.mt and --browser, --all, --format, --network, --build, --against-vtk, --first-visit, --pictures, --beside-vtk or --kinds, not `{other}`"
+                    "`bench` knows one FILE.mt and --browser, --all, --format, --network, --build, --parts, --against-vtk, --first-visit, --pictures, --beside-vtk or --kinds, not `{other}`"
                 )
             }
         }
@@ -50,6 +51,7 @@ pub fn run(args: &[String]) -> Result<()> {
 fn all() -> Result<()> {
     bench_format::run()?;
     bench_build::run(&[])?;
+    bench_parts::run(&[])?;
     bench_network::run(&[])?;
     bench_against_vtk::run(&[])?;
     bench_first_visit::run(&[])?;

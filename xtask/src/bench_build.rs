@@ -119,7 +119,7 @@ pub fn run(sizes: &[String]) -> Result<()> {
 }
 
 /// Of a grid of `size`³ points, each of whose cells has six.
-fn tetrahedra(size: u32) -> f64 {
+pub fn tetrahedra(size: u32) -> f64 {
     6.0 * f64::from(size - 1).powi(3)
 }
 
@@ -215,7 +215,7 @@ fn verify(tetralod: &Path, size: u32, file: &Path) -> Result<String> {
 }
 
 /// Runs a command that prints JSON: its seconds, the most memory that it had in bytes, and what it prints.
-fn measured(command: &mut Command) -> Result<(f64, f64, Value)> {
+pub fn measured(command: &mut Command) -> Result<(f64, f64, Value)> {
     let start = Instant::now();
     let mut child = command.stdout(Stdio::piped()).spawn()?;
     let status = format!("/proc/{}/status", child.id());
@@ -241,7 +241,7 @@ fn peak(status: &str) -> Option<f64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-fn number(report: &Value, name: &str) -> Result<f64> {
+pub fn number(report: &Value, name: &str) -> Result<f64> {
     report.get(name).and_then(Value::as_f64).with_context(|| format!("no {name} in {report}"))
 }
 

@@ -13,15 +13,17 @@ pub enum Part {
     Files,
     Network,
     Builds,
+    InParts,
     AgainstVtk,
     FirstVisit,
     Pictures,
 }
 
 /// How the parts begin, but for the first one.
-const TITLES: [&str; 5] = [
+const TITLES: [&str; 6] = [
     "\n## Over a network\n",
     "\n## Builds\n",
+    "\n## Builds in parts\n",
     "\n## Beside VTK's decimation\n",
     "\n## The first visit of the page\n",
     "\n## Pictures\n",

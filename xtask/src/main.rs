@@ -11,6 +11,7 @@ mod bench_first_visit;
 mod bench_format;
 mod bench_kinds;
 mod bench_network;
+mod bench_parts;
 mod bench_pictures;
 mod benchmarks_page;
 mod browser;
@@ -67,6 +68,7 @@ usage: cargo xtask COMMAND
   bench --format                 measure MT files and what first pictures need of them
   bench --network [SET...]       measure what requests cost over a network; a SET is a file or bucky:N
   bench --build [SIZE...]        measure builds of grids with SIZE³ points, whole and in parts, beside VTK's decimation
+  bench --parts [SIZE...]        measure how the steps of builds in parts grow, and what more workers bring
   bench --against-vtk [SET...]   measure meshes of equal size by VTK's decimation of tetrahedra, which comes from PyPI
   bench --first-visit            measure how soon the demo's page shows what
   bench --pictures [OPTION...]   measure the renderer in each mode, on the GPU or in software. Options: --size WxH
