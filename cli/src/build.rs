@@ -96,8 +96,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             let bytes = to.sharding.write(to.path, write)?;
             Written { mt, summary, bytes }
         }
-        Way::Parts(count) => {
-            let built = parts::build(parts::Whole::Mesh(Box::new(mesh)), &config, count, &to, verbosity);
+        Way::Parts { parts: count, joins } => {
+            let whole = parts::Whole::Mesh(Box::new(mesh));
+            let built = parts::build(whole, &config, [count, joins], &to, verbosity);
             built.with_context(|| options.name())??
         }
     };
@@ -145,7 +146,7 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
     }
     options.in_pieces(config, arguments.memory, verbosity, |input| {
         let way = match arguments.parts {
-            Some(count) => Way::Parts(count),
+            Some(count) => Way::parts(count),
             None => {
                 let PieceCounts { points, tetrahedra, largest, fields, meeting, .. } =
                     input.pieces.counts()?;
@@ -153,10 +154,10 @@ fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> R
                 way(&arguments.asked(), config, [points, tetrahedra, fields], Some([meeting, largest]))?
             }
         };
-        let Way::Parts(count) = way else { return Ok(None) };
+        let Way::Parts { parts: count, joins } = way else { return Ok(None) };
         let metadata = options.metadata(config);
         let to = Output { path: output, sharding: arguments.sharding, metadata: &metadata };
-        let built = parts::build(parts::Whole::Pieces(input), config, count, &to, verbosity);
+        let built = parts::build(parts::Whole::Pieces(input), config, [count, joins], &to, verbosity);
         match built.with_context(|| options.name())? {
             Ok(built) => Ok(Some(built)),
             Err(why) => {

@@ -12,7 +12,7 @@ use tetralod::mt::{AveragedField, MultiTessellation};
 use tetralod_build::BuildSummary;
 use tetralod_build::parts::Node;
 
-/// Joins parts that `tetralod build --part` has built: with --node eight of one level to one of the next, with -o all that has been
+/// Joins parts that `tetralod build --part` has built: with --node those of one level to one of the next, with -o all that has been
 /// built to one MT file.
 #[derive(clap::Args)]
 pub struct Arguments {

@@ -137,7 +137,7 @@ fn part(arguments: &Arguments, forget: &dyn Fn() -> Result<()>) -> Result<()> {
         plan
     } else {
         let (mesh, repaired) = options.read(&config, options.repair.level(), None)?;
-        options.repair_of(&mesh, &repaired, Way::Parts(*parts), verbosity)?;
+        options.repair_of(&mesh, &repaired, Way::parts(*parts), verbosity)?;
         let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata.clone());
         fill(&part).with_context(|| options.name())?
     };

@@ -56,7 +56,7 @@ pub struct PlanFile {
     /// That of the program that has parted the mesh: another one may build other bytes.
     version: String,
     pub parts: u32,
-    /// How many files each level has: `built-L-K.part`. Eight of one level make one of the next.
+    /// How many files each level has: `built-L-K.part`. As many of one level make one of the next as there are more of them.
     pub levels: Vec<u32>,
     pub tetrahedra: u64,
     vertices: u64,
@@ -67,6 +67,17 @@ impl PlanFile {
         let [vertices, tetrahedra] = plan.counts();
         let version = VERSION.to_owned();
         Self { version, parts: plan.parts(), levels: plan.levels(), tetrahedra, vertices }
+    }
+
+    /// The first of those that are joined to a node.
+    fn first_child(&self, node: Node) -> Result<Node> {
+        let level =
+            node.level.checked_sub(1).context("parts of level 0 are made by `tetralod build --part`")?;
+        let [below, own] = [level, node.level].map(|level| self.levels.get(level as usize).copied());
+        let (Some(below), Some(own)) = (below, own.filter(|&own| node.index < own)) else {
+            return Err(PartsError::NoNode { level: node.level, index: node.index }.into());
+        };
+        Ok(Node { level, index: node.index * (below / own) })
     }
 }
 
@@ -152,6 +163,11 @@ impl Folder<'_> {
 
     /// The plan, as its first part has it, if this version has made it.
     pub fn checked_plan(&self) -> Result<Plan> {
+        self.plan_file()?;
+        read(&self.parted(0), "`tetralod part`", |file| Plan::read(file))
+    }
+
+    fn plan_file(&self) -> Result<PlanFile> {
         let (folder, path) = (self.0.display(), self.0.join(PLAN));
         let text = match std::fs::read(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -162,7 +178,7 @@ impl Folder<'_> {
         let file: PlanFile = serde_json::from_slice(&text)
             .with_context(|| format!("{} is no plan of this version; part the mesh again", path.display()))?;
         check_version(self.0, &file.version)?;
-        read(&self.parted(0), "`tetralod part`", |file| Plan::read(file))
+        Ok(file)
     }
 
     fn keep_parted(&self, part: &Part<'_>) -> Result<(), PartsError> {
@@ -206,9 +222,15 @@ impl Folder<'_> {
         files::in_folder_beside(&self.built(node), |folder| make(&ScratchFolder::new(folder)))
     }
 
-    /// Builds or joins all nodes of a level, some of them at a time, each by one thread; a node that is alone, by all.
-    fn make_level(&self, plan: &Plan, level: u32, nodes: u32, verbosity: &Verbosity) -> Result<()> {
-        let side_by_side = rayon::current_num_threads().min(plan.parts() as usize);
+    /// Builds or joins all nodes of a level, so many of them at a time, each by one thread; a node that is alone, by all.
+    fn make_level(
+        &self,
+        plan: &Plan,
+        (level, nodes): (u32, u32),
+        at_a_time: u32,
+        verbosity: &Verbosity,
+    ) -> Result<()> {
+        let side_by_side = at_a_time.min(nodes);
         let bar = progress_bar(verbosity, "")?;
         bar.set_length(u64::from(nodes) * PER_NODE);
         bar.set_message(if level == 0 { "build parts" } else { "join parts" });
@@ -229,7 +251,7 @@ impl Folder<'_> {
             tell(PER_NODE);
             step
         };
-        if nodes == 1 || side_by_side == 1 {
+        if side_by_side == 1 {
             return (0..nodes).try_for_each(|index| make(index).map(drop));
         }
         let next = AtomicU32::new(0);
@@ -246,7 +268,7 @@ impl Folder<'_> {
             }
         };
         std::thread::scope(|scope| {
-            for _ in 0..side_by_side.min(nodes as usize) {
+            for _ in 0..side_by_side {
                 scope.spawn(|| {
                     if let Err(error) = work() {
                         // The others have nothing left to do.
@@ -406,8 +428,8 @@ pub fn build_part(inputs: &[PathBuf], [index, all]: [u32; 2], verbosity: &Verbos
 /// Joins parts of a folder: `tetralod join --node`.
 pub fn join_node(folder: &Path, node: Node, verbosity: &Verbosity) -> Result<()> {
     let folder = Folder(folder);
-    // No file is read but those that are joined: others may be on other machines.
-    let child = node.first_child().context("parts of level 0 are made by `tetralod build --part`")?;
+    // No part is read but those that are joined: others may be on other machines.
+    let child = folder.plan_file()?.first_child(node)?;
     let plan = folder.plan(child)?;
     with_progress(verbosity, |progress| folder.join(node, &plan, progress))??.print(verbosity)
 }
@@ -448,14 +470,14 @@ pub enum Whole<'a> {
     Pieces(InPieces<'a>),
 }
 
-/// Builds a mesh in so many parts by one process, as many at a time as there are threads, in a folder beside the output that is gone
-/// afterwards, and writes its MT file.
+/// Builds a mesh in so many parts by one process, as many at a time as there are threads and with so many joins at a time, in a folder beside the
+/// output that is gone afterwards, and writes its MT file.
 ///
 /// None, with the reason, if pieces of it cannot be parted one by one.
 pub fn build(
     whole: Whole<'_>,
     config: &BuildConfig,
-    count: u32,
+    [count, joins]: [u32; 2],
     output: &Output<'_>,
     verbosity: &Verbosity,
 ) -> Result<Result<Written, PartsError>> {
@@ -469,8 +491,10 @@ pub fn build(
                 Err(why) => return Ok(Err(why)),
             },
         };
+        let threads = rayon::current_num_threads() as u32;
         for (level, nodes) in (0..).zip(plan.levels()) {
-            folder.make_level(&plan, level, nodes, verbosity)?;
+            let at_a_time = if level == 0 { threads } else { joins };
+            folder.make_level(&plan, (level, nodes), at_a_time, verbosity)?;
         }
         folder.assemble(&plan, output, verbosity).map(Ok)
     })

@@ -14,8 +14,18 @@ use tetralod_build::{
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Way {
     Whole,
-    /// In so many parts.
-    Parts(u32),
+    /// In so many parts, of which so many joins run at a time.
+    Parts {
+        parts: u32,
+        joins: u32,
+    },
+}
+
+impl Way {
+    /// In so many parts, with as many joins at a time as there are threads.
+    pub fn parts(parts: u32) -> Self {
+        Self::Parts { parts, joins: rayon::current_num_threads() as u32 }
+    }
 }
 
 /// How many fields of a mesh are kept.
@@ -58,16 +68,16 @@ pub(super) fn way(
         }
     };
     if let Some(parts) = parts {
-        return Ok(if parts == 1 { Way::Whole } else { Way::Parts(parts) });
+        return Ok(if parts == 1 { Way::Whole } else { Way::parts(parts) });
     }
     match memory {
         Some(most) if needed > most => {
-            if let Some(parts) = count_for(config, [points, tetrahedra, fields], pieces, most) {
+            if let Some((parts, joins)) = count_for(config, [points, tetrahedra, fields], pieces, most) {
                 let disk = bytes(disk_in_parts([points, tetrahedra, fields]));
                 tell(format!(
                     "{what} of memory at once, so it is built in {parts} parts, with about {disk} of files beside the output until it is done"
                 ));
-                return Ok(Way::Parts(parts));
+                return Ok(Way::Parts { parts, joins });
             }
             let in_parts = match least_memory(config, [points, tetrahedra, fields], pieces) {
                 Some(least) => format!("in parts about {}, ", bytes(least)),
@@ -100,29 +110,38 @@ fn disk_in_parts([points, tetrahedra, fields]: [u64; 3]) -> u64 {
     tetrahedra.saturating_mul(75).saturating_add(more_fields.saturating_mul(60))
 }
 
-/// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are
-/// threads; none if it is not.
+/// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are threads, and
+/// how many joins run at a time; none if it is not.
 ///
 /// If it comes in pieces, so many points are in several, and the largest one has so many tetrahedra.
-fn count_for(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>, most: u64) -> Option<u32> {
-    memory_in_parts(config, counts, pieces).into_iter().find(|&(_, needed)| needed <= most).map(|(n, _)| n)
+fn count_for(
+    config: &BuildConfig,
+    counts: [u64; 3],
+    pieces: Option<[u64; 2]>,
+    most: u64,
+) -> Option<(u32, u32)> {
+    let fits = |(way, needed): (_, u64)| (needed <= most).then_some(way);
+    memory_in_parts(config, counts, pieces).find_map(fits)
 }
 
 /// The least memory in which it is built in parts; none if it is not.
 fn least_memory(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Option<u64> {
-    memory_in_parts(config, counts, pieces).into_iter().map(|(_, needed)| needed).min()
+    memory_in_parts(config, counts, pieces).map(|(_, needed)| needed).min()
 }
 
-/// The memory that each number of parts takes; none if it is not built in parts.
-fn memory_in_parts(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Vec<(u32, u64)> {
-    let Construction::HalfEdge { .. } = config.construction else { return Vec::new() };
-    let parts = std::iter::successors(Some(2_u32), |count| Some(2 * count)).take_while(|&n| n <= MOST_PARTS);
-    let needed = |count: u32| {
-        let at_a_time = rayon::current_num_threads().min(count as usize);
-        match pieces {
-            None => memory_needed_in_parts(counts, count, at_a_time as u32),
-            Some(pieces) => memory_needed_in_pieces(counts, pieces, count, at_a_time as u32),
-        }
+/// The memory that each number of parts takes, and of joins at a time; nothing if it is not built in parts. Those that take less time come first.
+fn memory_in_parts(
+    config: &BuildConfig,
+    counts: [u64; 3],
+    pieces: Option<[u64; 2]>,
+) -> impl Iterator<Item = ((u32, u32), u64)> {
+    let most = if matches!(config.construction, Construction::HalfEdge { .. }) { MOST_PARTS } else { 1 };
+    let threads = rayon::current_num_threads() as u32;
+    let needed = move |(parts, joins): (u32, u32)| match pieces {
+        None => memory_needed_in_parts(counts, parts, [threads, joins]),
+        Some(pieces) => memory_needed_in_pieces(counts, pieces, parts, [threads, joins]),
     };
-    parts.map(|count| (count, needed(count))).collect()
+    let parts = std::iter::successors(Some(2_u32), |count| Some(2 * count)).take_while(move |&n| n <= most);
+    let ways = parts.flat_map(move |parts| (1..=threads).rev().map(move |joins| (parts, joins)));
+    ways.map(move |way| (way, needed(way)))
 }

@@ -23,7 +23,7 @@ fn parts_make_the_file_that_one_process_makes() {
     let input = generate(&folder, "25");
     let [dir, mt, once] = ["dir", "joined.mt", "once.mt"].map(|name| folder.path(name));
     let plan = json(&["part", &input, "--parts", "16", "-o", &dir, "--meta", "who=me", "--json"]);
-    assert_eq!((&plan["parts"], &plan["levels"]), (&16.into(), &serde_json::json!([16, 2, 1])));
+    assert_eq!((&plan["parts"], &plan["levels"]), (&16.into(), &serde_json::json!([16, 8, 2, 1])));
     let written: serde_json::Value =
         serde_json::from_slice(&fs::read(format!("{dir}/plan.json")).expect("a plan")).expect("JSON");
     assert_eq!((&written["levels"], &written["tetrahedra"]), (&plan["levels"], &(6 * 24 * 24 * 24).into()));
@@ -33,12 +33,15 @@ fn parts_make_the_file_that_one_process_makes() {
         assert!(step["left"].as_u64() < step["tetrahedra"].as_u64(), "{step}");
     }
     // What is missing is named, with the command that makes it.
-    bad(1, &["join", &dir, "-o", &mt], &["built-2-0.part", "`tetralod join --node 2/0`"]);
-    for node in ["1/1", "1/0", "2/0"] {
-        good(&["join", &dir, "--node", node]);
+    bad(1, &["join", &dir, "-o", &mt], &["built-3-0.part", "`tetralod join --node 3/0`"]);
+    bad(1, &["join", &dir, "--node", "1/8"], &["no part 8 at level 1"]);
+    bad(1, &["join", &dir, "--node", "4/0"], &["no part 0 at level 4"]);
+    bad(1, &["join", &dir, "--node", "0/0"], &["`tetralod build --part`"]);
+    for (level, nodes) in [(1, 8), (2, 2), (3, 1)] {
+        (0..nodes).rev().for_each(|node| drop(good(&["join", &dir, "--node", &format!("{level}/{node}")])));
     }
     // All that is in the folder is read, and stays.
-    bad(1, &["join", &dir, "-o", &format!("{dir}/built-2-0.part")], &["is an input, too", "another file"]);
+    bad(1, &["join", &dir, "-o", &format!("{dir}/built-3-0.part")], &["is an input, too", "another file"]);
     let joined = json(&["join", &dir, "-o", &mt, "--json", "--quiet"]);
     let built = json(&["build", &input, "--parts", "16", "--meta", "who=me", "-o", &once, "--json"]);
     for count in ["vertices", "tetrahedra", "base_vertices", "updates", "depth", "file_bytes"] {
@@ -102,7 +105,7 @@ fn steps_on_other_files_are_refused() {
     told(1, &["join", &dir], &["--node", "1/0"], "built-0-0.part (written by `tetralod build --part`)");
     good(&["build", &dir, "--part", "0/2"]);
     told(1, &["join", &dir], &["--node", "1/0"], "build --part 1/2");
-    told(1, &["join", &dir], &["--node", "1/1"], "built-0-8.part");
+    told(1, &["join", &dir], &["--node", "1/1"], "no part 1 at level 1");
     told(1, &["join", &dir], &["--node", "0/0"], "`tetralod build --part`");
     fs::write(format!("{dir}/built-0-1.part"), b"something else").expect("a file");
     told(1, &["join", &dir], &["--node", "1/0"], "no part that this version");
@@ -161,7 +164,9 @@ fn pieces_are_built_as_their_whole() {
     for index in 0..4 {
         good(&["build", &dir, "--part", &format!("{index}/4")]);
     }
-    good(&["join", &dir, "--node", "1/0"]);
+    for node in ["1/0", "1/1", "2/0"] {
+        good(&["join", &dir, "--node", node]);
+    }
     good(&["join", &dir, "-o", &mt]);
     good(&["build", &whole, "--parts", "4", "-o", &other]);
     let same = || fs::read(&mt).expect("a file") == fs::read(&other).expect("a file");

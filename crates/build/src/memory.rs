@@ -1,6 +1,6 @@
 //! How much memory building takes: known before it begins, from counts alone.
 
-use super::parts::LEFT_AT_INTERFACE;
+use super::parts::{left_at_interface, levels};
 use super::{Construction, Method};
 use tetralod::mt::MtKind;
 
@@ -18,10 +18,14 @@ fn bytes_a_tetrahedron(construction: Construction) -> u64 {
 /// Tetrahedra of a triangulation for each hundred of its points.
 const TRIANGULATED: u64 = 680;
 
-/// The memory in bytes that building in `parts` takes at most at any time (see [`parts`](super::parts)), `at_a_time` of them side by
+/// The memory in bytes that building in `parts` takes at most at any time (see [`parts`](super::parts)), so many of them and so many joins side by
 /// side, of a mesh of so many points, tetrahedra and fields. One process holds the mesh while it is parted. A forecast, as
 /// [`memory_needed`].
-pub fn memory_needed_in_parts([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
+pub fn memory_needed_in_parts(
+    [points, tetrahedra, fields]: [u64; 3],
+    parts: u32,
+    at_a_time: [u32; 2],
+) -> u64 {
     let parting = tetrahedra.saturating_mul(24).saturating_add(points.saturating_mul(100 + 24 * fields));
     parting.max(after_parting([points, tetrahedra, fields], parts, at_a_time))
 }
@@ -32,7 +36,7 @@ pub fn memory_needed_in_pieces(
     counts: [u64; 3],
     [meeting, largest]: [u64; 2],
     parts: u32,
-    at_a_time: u32,
+    at_a_time: [u32; 2],
 ) -> u64 {
     let [points, tetrahedra, fields] = counts;
     let each = 100 + 16 * fields;
@@ -51,31 +55,40 @@ const SORTED: u64 = 16 << 20;
 const IN_BLOCKS: u64 = 16 << 20;
 
 /// What the steps after parting take.
-fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
+fn after_parting(
+    [points, tetrahedra, fields]: [u64; 3],
+    parts: u32,
+    [parts_at_a_time, joins_at_a_time]: [u32; 2],
+) -> u64 {
     let of_points = |bytes: u64| points.saturating_mul(bytes);
-    let of_tets = |bytes: u64| tetrahedra.saturating_mul(bytes);
-    let whole = of_tets(150).saturating_add(of_points(120 * fields.saturating_sub(1)));
-    let part = whole / u64::from(parts.max(1)) * u64::from(at_a_time);
-    // What is left of the children is an eighth of their tetrahedra; of points, few are in memory. But more stay where parts meet: at both sides
-    // of planes across a grid, two triangles for each square.
-    let side = libm::cbrt(points as f64);
-    let left = |planes: f64| {
-        let at_interfaces = (4.0 * planes * side * side) as u64;
-        at_interfaces.saturating_mul(LEFT_AT_INTERFACE as u64).max(tetrahedra / 8).min(tetrahedra)
-    };
-    let joining = |planes: f64| left(planes).saturating_mul(132 + 8 * fields);
+    let whole = tetrahedra.saturating_mul(150).saturating_add(of_points(120 * fields.saturating_sub(1)));
+    let part = whole / u64::from(parts.max(1)) * u64::from(parts_at_a_time);
     // Each point has a record, in blocks of which half may be out of use.
     let in_blocks = of_points(2 * (25 + 8 * fields)).min(IN_BLOCKS);
-    let last = joining(3.0).saturating_add(in_blocks);
-    let assembling = left(6.0).saturating_mul(60).saturating_add(of_points(24 + 6 * fields));
+    let (mut joining, mut largest) = (0, 0);
+    let levels = levels(parts);
+    for (below, pair) in (0..).zip(levels.windows(2)) {
+        let &[children, nodes] = pair else { continue };
+        let each = left(tetrahedra, below, children, points) / u64::from(nodes);
+        largest = each.max(largest);
+        let joined = each.saturating_mul(132 + 8 * fields).saturating_add(in_blocks);
+        joining = joining.max(joined.saturating_mul(joins_at_a_time.min(nodes).into()));
+    }
+    let assembling = largest.saturating_mul(130).saturating_add(of_points(4 + 4 * fields));
     let assembling = assembling.saturating_add(of_points(20).min(SORTED));
-    // Of what has been freed, allocators keep some for each thread. One step alone is done by the thread that assembles.
-    let joins = parts.div_ceil(8);
-    let first = joining(3.0 * (libm::cbrt(parts.into()) - 1.0));
-    let at_a_time_then = u64::from(at_a_time.min(joins));
-    let side_by_side = if joins > 1 { (first / u64::from(joins) + in_blocks) * at_a_time_then } else { 0 };
-    let kept = if at_a_time > 1 { part.max(side_by_side) / 2 } else { 0 };
-    part.max(last.max(assembling).saturating_add(kept))
+    // Of what has been freed, allocators keep some for each thread.
+    let kept = if parts_at_a_time > 1 { part / 2 } else { 0 };
+    part.max(joining.max(assembling).saturating_add(kept))
+}
+
+/// Tetrahedra that are left of all nodes of a level of so many: an eighth of what is left of the level below. But more stay where nodes meet, at both
+/// sides of planes across a grid, two triangles for each square.
+fn left(tetrahedra: u64, level: u32, nodes: u32, points: u64) -> u64 {
+    let halvings = nodes.max(1).ilog2();
+    let planes: u32 = (0..3).map(|axis| (1 << ((halvings + axis) / 3)) - 1).sum();
+    let side = libm::cbrt(points as f64);
+    let at_planes = (4.0 * side * side) as u64 * u64::from(planes) * left_at_interface(nodes) as u64;
+    at_planes.max(tetrahedra >> (3 * (level + 1)).min(63)).min(tetrahedra)
 }
 
 /// The memory in bytes that [`build`](super::build) and [`encode`](tetralod::format::encode) take at most for a mesh of so many points,
@@ -110,8 +123,8 @@ mod tests {
     #[test]
     fn what_threads_have_taken_counts_after_them() {
         // What one process takes for a grid of 65³ points, two parts at a time, of which glibc keeps some of what is free.
-        for (parts, measured) in [(2, 159_000_000), (4, 92_000_000), (8, 97_000_000), (16, 103_000_000)] {
-            let needed = memory_needed_in_parts([274_625, 1_572_864, 1], parts, 2);
+        for (parts, measured) in [(2, 155_000_000), (4, 89_000_000), (8, 76_000_000), (16, 78_000_000)] {
+            let needed = memory_needed_in_parts([274_625, 1_572_864, 1], parts, [2; 2]);
             assert!(needed > measured, "{parts} parts: {needed}");
         }
     }
@@ -125,7 +138,7 @@ mod tests {
             ([365_120, 2_135_484, 1], 93_756, 196_608, 152_200_000),
             ([1_524_224, 9_001_692, 1], 193_843, 1_048_576, 329_300_000),
         ] {
-            let needed = memory_needed_in_pieces(counts, [meeting, largest], 64, 1);
+            let needed = memory_needed_in_pieces(counts, [meeting, largest], 64, [1; 2]);
             assert!(needed + needed / 10 > measured, "{counts:?}: {needed}");
         }
     }

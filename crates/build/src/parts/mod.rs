@@ -2,7 +2,7 @@
 //!
 //! The domain is parted in space ([`part`]). Each part is built on its own ([`build_part`]): vertices that it shares with others stay,
 //! so what is left of it still fits them. Eight parts at a time are joined ([`join`]): what was between them is simplified then, and
-//! what is left joins the next seven, as in an octree. In the end one MT is made of all updates (`assemble`), which does not know
+//! what is left joins the next seven, as in an octree; but the last eight are joined in two steps, for at the end most is left. In the end one MT is made of all updates (`assemble`), which does not know
 //! of the parts. (Danovaro, De Floriani, Magillo, Puppo 2003 name this as future work [§7].)
 //!
 //! Each step reads and writes plain bytes, its result depends on nothing else, and takes memory for what is left of a part. The error
@@ -31,7 +31,7 @@
 //!     N +-----o E   E o-----+ N
 //! ```
 //!
-//! How eight are joined: open vertices that nobody outside has become ordinary ones, and faces between the eight become inner ones again.
+//! How parts are joined: open vertices that nobody outside has become ordinary ones, and faces between these parts become inner ones again.
 //! So what stayed at them is simplified now, and nothing stays in the end.
 //!
 //! ```text
@@ -41,7 +41,7 @@
 //!     |   |   |   |   |         |       |       |         |               |
 //!     +---+---+---+---+         +-------+-------+         +---------------+
 //!     level 0: eight parts      level 1: two nodes        level 2: the whole
-//!     (four make one here, eight in space)
+//!     (four make one of the last eight, eight make one before)
 //! ```
 //!
 //! What must hold:
@@ -106,11 +106,12 @@ pub use assemble::assemble;
 pub use assemble::{Assembled, assemble_blocks};
 #[doc(hidden)]
 pub use grid::{GridValues, PointBox, part_grid};
-pub(super) use node::LEFT_AT_INTERFACE;
+pub(super) use node::left_at_interface;
 pub use node::{build_part, join};
 pub use partition::part;
 pub use piece::{Part, PartUpdates};
 pub use piecewise::Piecewise;
+pub(super) use plan::levels;
 pub use plan::{MOST_PARTS, Node, Plan};
 
 #[doc(hidden)]

@@ -614,8 +614,8 @@ mod tests {
 
     /// A part as it is written first, and when it has been built, and its updates.
     fn parts() -> ([Vec<u8>; 2], PartUpdates) {
-        let grid = Grid { dims: [9; 3], origin: [0.0; 3], spacing: [1.0; 3] };
-        let values = (0..9_u32.pow(3)).map(|i| f64::from(i * i % 997)).collect();
+        let grid = Grid { dims: [13; 3], origin: [0.0; 3], spacing: [1.0; 3] };
+        let values = (0..13_u32.pow(3)).map(|i| f64::from(i * i % 997)).collect();
         let mesh = TetMesh::from_grid(grid, vec![Field::new("h", values)]);
         let mut first = None;
         let put = &mut |part| {

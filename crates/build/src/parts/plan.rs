@@ -12,7 +12,8 @@ use tetralod::mt::{FieldInfo, MtInfo, MtKind, RegionInfo, Regions};
 /// Most parts of a plan.
 pub const MOST_PARTS: u32 = 4096;
 
-/// So many parts are joined at a time: halves along each of three axes.
+/// So many are joined at a time, halves along each of three axes: but the last so many in two steps. What a join has in memory is what is left at
+/// planes between nodes. For the last eight these are three across the whole, two of which are joined first, in each half, and then one.
 const JOINED: u32 = 8;
 
 /// What an MT is built for in so many parts, if it is.
@@ -25,8 +26,8 @@ pub(super) fn purpose(config: &BuildConfig, parts: u32) -> Result<Purpose, Parts
     }
 }
 
-/// What is made by one step: at level 0 the parts, numbered so that those that are joined follow one another; above them what each
-/// eight of the level below become.
+/// What is made by one step: at level 0 the parts, numbered so that those that are joined follow one another; above them what those
+/// of the level below become ([`Plan::children`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Node {
     /// The level, 0 for the parts.
@@ -35,11 +36,15 @@ pub struct Node {
     pub index: u32,
 }
 
-impl Node {
-    /// The first of the nodes of the level below that make this one; none make the parts.
-    pub fn first_child(self) -> Option<Self> {
-        Some(Self { level: self.level.checked_sub(1)?, index: self.index.saturating_mul(JOINED) })
-    }
+/// How many nodes each level has of so many parts.
+pub(crate) fn levels(parts: u32) -> Vec<u32> {
+    let above = |&nodes: &u32| match nodes {
+        0 | 1 => None,
+        2 => Some(1),
+        3..=JOINED => Some(2),
+        _ => Some((nodes / JOINED).max(JOINED)),
+    };
+    std::iter::successors(Some(parts), above).collect()
 }
 
 /// How a volume is parted, and all that the steps have to know of the whole.
@@ -245,10 +250,10 @@ impl Plan {
         &self.metadata
     }
 
-    /// How many nodes each level has; the last one has one.
+    /// How many nodes each level has. The last ones have eight, two and one, as far as there are so many parts; below these, eight make one
+    /// of the next level, or as few as leave eight.
     pub fn levels(&self) -> Vec<u32> {
-        let above = |&nodes: &u32| (nodes > 1).then(|| nodes.div_ceil(JOINED));
-        std::iter::successors(Some(self.parts), above).collect()
+        levels(self.parts)
     }
 
     /// All nodes, coarse to fine: the last one to be joined first.
@@ -267,16 +272,25 @@ impl Plan {
     /// # Errors
     /// If there is no such node; if it is of level 0.
     pub fn children(&self, node: Node) -> Result<Vec<Node>, PartsError> {
+        let below = node.level.checked_sub(1).filter(|_| self.has(node));
+        let level = below.ok_or(PartsError::NoNode { level: node.level, index: node.index })?;
+        Ok(self.below(node, level).map(|index| Node { level, index }).collect())
+    }
+
+    /// The nodes of a level below of which a node consists.
+    fn below(&self, node: Node, level: u32) -> Range<u32> {
         let levels = self.levels();
-        let Some(level) = node.level.checked_sub(1).filter(|_| self.has(node)) else {
-            return Err(PartsError::NoNode { level: node.level, index: node.index });
-        };
-        let last = ((node.index + 1) * JOINED).min(levels[level as usize]);
-        Ok((node.index * JOINED..last).map(|index| Node { level, index }).collect())
+        let each = levels[level as usize] / levels[node.level as usize];
+        node.index * each..(node.index + 1) * each
+    }
+
+    /// How many nodes there are of the level of a node; 0 if there is no such level.
+    pub(super) fn beside(&self, node: Node) -> u32 {
+        self.levels().get(node.level as usize).copied().unwrap_or(0)
     }
 
     pub(super) fn has(&self, node: Node) -> bool {
-        self.levels().get(node.level as usize).is_some_and(|&nodes| node.index < nodes)
+        node.index < self.beside(node)
     }
 
     /// Whether a node is the last one to be joined.
@@ -286,9 +300,7 @@ impl Plan {
 
     /// The parts that a node consists of.
     pub(super) fn parts_of(&self, node: Node) -> Range<u32> {
-        let each = JOINED.saturating_pow(node.level);
-        let first = node.index.saturating_mul(each);
-        first..self.parts.min(first.saturating_add(each))
+        self.below(node, 0)
     }
 
     /// What is known of the MT; not how many updates it has.

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 
 /// How each file begins; the last byte is the version.
-const MAGIC: [u8; 8] = *b"mtparts\x07";
+const MAGIC: [u8; 8] = *b"mtparts\x08";
 
 /// Bytes in front of a frame.
 const HEAD: usize = 12;

@@ -75,6 +75,13 @@ impl Files {
         assert!(files[0] == files[1], "another part");
     }
 
+    /// Joins the nodes below a level, those of each level in any order.
+    fn join_below(&mut self, plan: &Plan, end: u32) {
+        for (level, nodes) in (0..end).zip(plan.levels()).skip(1) {
+            (0..nodes).rev().for_each(|index| self.join(plan, Node { level, index }));
+        }
+    }
+
     fn updates(&self, node: Node) -> Result<PartUpdates, PartsError> {
         PartUpdates::read(&mut Cursor::new(&self.built[&node]))
     }
@@ -138,10 +145,7 @@ pub fn in_parts(mesh: &TetMesh, config: &BuildConfig, parts: u32) -> BuildResult
     let (plan, mut files) = Files::parted(mesh, config, parts);
     // In any order.
     (0..parts).rev().for_each(|index| files.build(index));
-    let joins: Vec<Node> = plan.nodes().into_iter().rev().filter(|node| node.level > 0).collect();
-    let mut by_level = joins;
-    by_level.sort();
-    by_level.into_iter().for_each(|node| files.join(&plan, node));
+    files.join_below(&plan, u32::MAX);
     files.assemble(&plan)
 }
 
@@ -303,6 +307,7 @@ fn the_progress_of_a_step_is_that_of_the_step() {
     let (plan, mut files) = Files::parted(&mesh, &BuildConfig::default(), 8);
     (0..8).for_each(|index| files.build(index));
     let whole = plan.nodes()[0];
+    files.join_below(&plan, whole.level);
     let shares = |work: &dyn Fn(OnProgress<'_>)| {
         let mut shares = Vec::new();
         work(&mut |now: BuildProgress| {
@@ -329,17 +334,27 @@ fn the_progress_of_a_step_is_that_of_the_step() {
 }
 
 #[test]
-fn levels_and_children_are_those_of_an_octree() {
+fn eight_are_joined_at_a_time_and_the_last_eight_in_two_steps() {
     let mesh = blocks([6; 3], &[hilly], |_| true);
     let (plan, files) = Files::parted(&mesh, &BuildConfig::default(), 32);
-    assert_eq!((plan.parts(), plan.levels()), (32, vec![32, 4, 1]));
-    assert_eq!(plan.nodes().len(), 37);
-    let children = plan.children(Node { level: 2, index: 0 }).expect("four");
-    assert_eq!(children.len(), 4);
+    assert_eq!((plan.parts(), plan.levels()), (32, vec![32, 8, 2, 1]));
+    assert_eq!(plan.nodes().len(), 43);
+    // Each is of one node of the next level, in their order.
+    for (level, nodes) in (0..).zip(plan.levels()).skip(1) {
+        let children = (0..nodes).flat_map(|index| plan.children(Node { level, index }).expect("children"));
+        assert!(
+            children.eq((0..plan.levels()[level as usize - 1]).map(|index| Node { level: level - 1, index }))
+        );
+        assert!(plan.children(Node { level, index: nodes }).is_err());
+    }
     assert!(
-        plan.children(Node { level: 2, index: 1 }).is_err()
-            && plan.children(Node { level: 0, index: 0 }).is_err()
+        plan.children(Node { level: 0, index: 0 }).is_err()
+            && plan.children(Node { level: 4, index: 0 }).is_err()
     );
+    let larger = blocks([12; 3], &[hilly], |_| true);
+    let levels = |parts| Files::parted(&larger, &BuildConfig::default(), parts).0.levels();
+    assert_eq!((levels(1), levels(2), levels(16)), (vec![1], vec![2, 1], vec![16, 8, 2, 1]));
+    assert_eq!((levels(64), levels(128)), (vec![64, 8, 2, 1], vec![128, 16, 8, 2, 1]));
     let scratch = InMemory::default();
     let sizes: Vec<usize> =
         files.parted.iter().map(|bytes| read(bytes, &scratch).expect("a part").tetrahedra()).collect();
@@ -374,7 +389,7 @@ fn what_cannot_be_parted_or_joined_is_refused() {
     let scratch = &InMemory::default();
     let left = || -> Vec<Part<'_>> {
         plan.children(Node { level: 1, index: 0 })
-            .expect("eight")
+            .expect("four")
             .iter()
             .map(|child| read(&files.built[child], scratch).expect("a part"))
             .collect()
