@@ -3,7 +3,7 @@
 //! Each node has ordered its own updates into blocks. They are numbered from the last node down to the parts, which extends the partial order, and
 //! appended in this order, as for a whole. The mesh to which they are applied is never there as a whole: what is left of a node is all that its
 //! own updates remove, a patch. Nor is the MT, unless it is asked for: whole blocks are taken as they come, and which updates there are beside which
-//! vertex is kept in the scratch. In memory are a few numbers for each update, and one node.
+//! vertex is kept in the scratch, and so is the number of each vertex. In memory is one node, and what upper levels have of errors.
 //!
 //! ```text
 //!     updates of all nodes ──▶ what each inserts, beside which vertex ──▶ by vertices, in the scratch
@@ -42,8 +42,6 @@ pub struct Assembled {
     pub builder: HalfEdgeBuilder,
     /// What is known of the MT.
     pub summary: BuildSummary,
-    /// The MT's vertex for each reference vertex.
-    vertices: Vec<u32>,
 }
 
 /// Makes the MT: `left` gives what is left of every node of the plan ([`Plan::nodes`]), that of the last one several times, and `updates` those of
@@ -58,10 +56,10 @@ pub fn assemble(
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, PartsError> {
     let scratch = InMemory::default();
-    let made = assemble_blocks(plan, (left, updates), &scratch, &mut |_| Ok(()), progress)?;
-    let Assembled { builder, summary, vertices } = made;
+    let (made, numbers) = assembled(plan, (left, updates), &scratch, &mut |_| Ok(()), progress)?;
+    let Assembled { builder, summary } = made;
     let mt = builder.finish().map_err(BuildError::from)?;
-    let vertices: Vec<VertexId> = vertices.into_iter().map(VertexId).collect();
+    let vertices: Vec<VertexId> = numbers.all()?.into_iter().map(VertexId).collect();
     let exact = exact(plan, left, &vertices)?;
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
@@ -78,11 +76,24 @@ pub fn assemble_blocks(
     take: OnBlocks<'_>,
     progress: OnProgress<'_>,
 ) -> Result<Assembled, PartsError> {
+    let (made, numbers) = assembled(plan, (left, updates), scratch, take, progress)?;
+    numbers.remove()?;
+    Ok(made)
+}
+
+/// [`assemble_blocks`], and the MT's vertex for each reference vertex.
+fn assembled<'a>(
+    plan: &'a Plan,
+    (left, updates): (Of<'_, Part<'_>>, Of<'_, PartUpdates>),
+    scratch: &'a dyn Scratch,
+    take: OnBlocks<'_>,
+    progress: OnProgress<'_>,
+) -> Result<(Assembled, VertexNumbers<'a>), PartsError> {
     let listed = Listed::read(plan, updates, scratch)?;
     let (assembly, summary) = Assembly::begin(plan, piece_of(plan, plan.nodes()[0], left)?, listed)?;
-    let (builder, vertices) = assembly.append_all((left, updates), take, progress)?;
+    let (builder, numbers) = assembly.append_all((left, updates), take, progress)?;
     let summary = BuildSummary { depth: builder.depth(), ..summary };
-    Ok(Assembled { builder, summary, vertices })
+    Ok((Assembled { builder, summary }, numbers))
 }
 
 /// What is left of a node, without what only joins need.
@@ -268,6 +279,76 @@ impl<'a> Listed<'a> {
 /// What is wrong where updates do not go with the points.
 const OTHER_POINTS: &str = "its updates are those of other points";
 
+/// The MT's vertex for each reference vertex: in the scratch, for there are as many as points.
+struct VertexNumbers<'a> {
+    scratch: &'a dyn Scratch,
+    count: u32,
+}
+
+/// Under this name.
+const VERTICES: &str = "vertices";
+
+impl<'a> VertexNumbers<'a> {
+    fn keep(scratch: &'a dyn Scratch, numbers: Vec<u32>) -> Result<Self, PartsError> {
+        scratch.write(VERTICES, &[])?;
+        for some in numbers.chunks(AT_A_TIME as usize) {
+            let bytes: Vec<u8> = some.iter().flat_map(|number| number.to_le_bytes()).collect();
+            scratch.append(VERTICES, &bytes)?;
+        }
+        Ok(Self { scratch, count: numbers.len() as u32 })
+    }
+
+    /// Those of some reference vertices, each of which may come several times.
+    fn of<'p>(&self, points: impl Iterator<Item = &'p u32>) -> Result<KnownNumbers, PartsError> {
+        let mut points: Vec<u32> = points.copied().collect();
+        points.sort_unstable();
+        points.dedup();
+        if points.last().is_some_and(|&last| last >= self.count) {
+            return Err(PartsError::Damaged { what: OTHER_POINTS });
+        }
+        let mut numbers = Vec::with_capacity(points.len());
+        let mut rest = &points[..];
+        while let Some(&first) = rest.first() {
+            let (some, others) = rest.split_at(rest.partition_point(|&point| point - first < AT_A_TIME));
+            let last = some.last().copied().unwrap_or(first);
+            let read = self.read(first..last + 1)?;
+            numbers.extend(some.iter().map(|&point| read[(point - first) as usize]));
+            rest = others;
+        }
+        Ok(KnownNumbers { points, numbers })
+    }
+
+    fn all(self) -> Result<Vec<u32>, PartsError> {
+        let numbers = self.read(0..self.count)?;
+        self.remove()?;
+        Ok(numbers)
+    }
+
+    fn read(&self, points: Range<u32>) -> Result<Vec<u32>, PartsError> {
+        let mut bytes = vec![0; 4 * points.len()];
+        self.scratch.read_at(VERTICES, 4 * u64::from(points.start), &mut bytes)?;
+        Ok(bytes.as_chunks::<4>().0.iter().map(|number| u32::from_le_bytes(*number)).collect())
+    }
+
+    fn remove(self) -> Result<(), PartsError> {
+        Ok(self.scratch.remove(VERTICES)?)
+    }
+}
+
+/// Some of them.
+struct KnownNumbers {
+    /// Ascending.
+    points: Vec<u32>,
+    numbers: Vec<u32>,
+}
+
+impl KnownNumbers {
+    /// The MT's vertex for a reference vertex, which is among them; [`NONE`] if it is not.
+    fn of(&self, point: u32) -> u32 {
+        self.points.binary_search(&point).map_or(NONE, |at| self.numbers[at])
+    }
+}
+
 /// Reference vertices with their levels: vertex by vertex and field by field, and behind these those of their sides.
 struct Vertices {
     levels: Vec<i32>,
@@ -302,8 +383,7 @@ struct Assembly<'a> {
     plan: &'a Plan,
     info: MtInfo,
     builder: HalfEdgeBuilder,
-    /// The MT's vertex for each reference vertex.
-    number: Vec<u32>,
+    vertices: VertexNumbers<'a>,
     numbers: Numbers,
     children: Children<'a>,
     done: usize,
@@ -343,17 +423,18 @@ impl<'a> Assembly<'a> {
         let points = (&vertices.levels[..], &vertices.sides);
         let base = (&numbered, [&places[..], &names]);
         let builder = append::begin(described, base, &base_marks, points, forest, plan.block_bits)?;
+        let vertices = VertexNumbers::keep(listed.scratch, number)?;
         let numbers = listed.numbers;
-        Ok((Self { plan, info, builder, number, numbers, children, done: 0 }, summary))
+        Ok((Self { plan, info, builder, vertices, numbers, children, done: 0 }, summary))
     }
 
-    /// Returns the builder with all updates, and the MT's vertex for each reference vertex.
+    /// Returns the builder with all updates, and the MT's vertex for each reference vertex, which stays in the scratch.
     fn append_all(
         mut self,
         (left, updates): (Of<'_, Part<'_>>, Of<'_, PartUpdates>),
         take: OnBlocks<'_>,
         progress: OnProgress<'_>,
-    ) -> Result<(HalfEdgeBuilder, Vec<u32>), PartsError> {
+    ) -> Result<(HalfEdgeBuilder, VertexNumbers<'a>), PartsError> {
         for level in self.plan.nodes().chunk_by(|a, b| a.level == b.level) {
             for &node in level {
                 let piece = piece_of(self.plan, node, left)?;
@@ -364,7 +445,7 @@ impl<'a> Assembly<'a> {
             take(&mut self.builder)?;
         }
         self.children.remove()?;
-        Ok((self.builder, self.number))
+        Ok((self.builder, self.vertices))
     }
 
     /// Appends the updates of a node to what is left of it: those that are left over from blocks come behind those of the other nodes of its level.
@@ -380,10 +461,11 @@ impl<'a> Assembly<'a> {
             return Err(PartsError::OtherPlan);
         }
         let vertices = Vertices::of(self.plan, &self.info, &mut piece);
-        let patch = self.patch(&piece, &vertices, &rows)?;
+        let known = self.vertices.of(piece.points.iter().chain(&rows.vertices).chain(&rows.near))?;
+        let patch = self.patch(&piece, &vertices, &rows, &known)?;
         self.builder.start_patch(patch).map_err(BuildError::from)?;
         let Piece { points, .. } = piece;
-        let reference = (&points[..], &vertices);
+        let reference = (&points[..], &vertices, &known);
         let (in_blocks, left_over) = rows.split(in_blocks as usize, self.info.fields.len());
         self.append(node, first, &in_blocks, reference, progress)?;
         if !left_over.vertices.is_empty() {
@@ -395,10 +477,12 @@ impl<'a> Assembly<'a> {
     }
 
     /// The forest of a patch: of its vertices and of those that are inserted into it, all of which are reference vertices.
-    fn forest(&self, vertices: impl Iterator<Item = u32>) -> Result<Forest, PartsError> {
-        let number = |point: u32| self.number.get(point as usize).map(|&number| (number, point));
-        let named: Option<Vec<(u32, u32)>> = vertices.map(number).collect();
-        let mut named = named.ok_or(PartsError::Damaged { what: OTHER_POINTS })?;
+    fn forest(
+        &self,
+        vertices: impl Iterator<Item = u32>,
+        known: &KnownNumbers,
+    ) -> Result<Forest, PartsError> {
+        let mut named: Vec<(u32, u32)> = vertices.map(|point| (known.of(point), point)).collect();
         named.sort_unstable();
         named.dedup();
         let (labels, names): (Vec<u32>, Vec<u32>) = named.into_iter().unzip();
@@ -407,7 +491,13 @@ impl<'a> Assembly<'a> {
     }
 
     /// What is left of a node, as the MT knows it; `rows` are the node's updates.
-    fn patch(&self, piece: &Piece, vertices: &Vertices, rows: &UpdateRows) -> Result<Patch, PartsError> {
+    fn patch(
+        &self,
+        piece: &Piece,
+        vertices: &Vertices,
+        rows: &UpdateRows,
+        known: &KnownNumbers,
+    ) -> Result<Patch, PartsError> {
         let fields = self.info.fields.len();
         let mut used: Vec<u32> = piece.tets.iter().flatten().copied().collect();
         used.sort_unstable();
@@ -437,14 +527,14 @@ impl<'a> Assembly<'a> {
             let further = further_regions(used.len(), &tets, &regions).into_iter();
             side_levels = further.flat_map(|(v, region)| at(used[v as usize], region)).copied().collect();
         }
-        let forest =
-            self.forest(used.iter().map(|&v| piece.points[v as usize]).chain(rows.vertices.iter().copied()))?;
+        let of_patch = used.iter().map(|&v| piece.points[v as usize]).chain(rows.vertices.iter().copied());
+        let forest = self.forest(of_patch, known)?;
         // What is left of the node is removed but for what is of the reference mesh.
         let stays = |code: &&RemoverCode| !matches!(Remover::from(**code), Remover::Own(_));
         let stay = marks.iter().filter(|mark| mark.remover == NONE).count();
         let room = [used.len() + rows.vertices.len(), stay + rows.removers.iter().filter(stays).count()];
         let positions = used.iter().map(|&v| piece.positions[v as usize]).collect();
-        let vertices = used.iter().map(|&v| self.number[piece.points[v as usize] as usize]).collect();
+        let vertices = used.iter().map(|&v| known.of(piece.points[v as usize])).collect();
         Ok(Patch {
             mesh: BaseMesh { positions, values, tets },
             vertices,
@@ -462,10 +552,10 @@ impl<'a> Assembly<'a> {
         node: Node,
         first: u32,
         rows: &UpdateRows,
-        (points, vertices): (&[u32], &Vertices),
+        (points, vertices, known): (&[u32], &Vertices, &KnownNumbers),
         progress: OnProgress<'_>,
     ) -> Result<(), PartsError> {
-        let Self { builder, number: vertex_of, numbers, done, info, .. } = self;
+        let Self { builder, numbers, done, info, .. } = self;
         let earlier = rows.earlier.iter().map(|&made| numbers.of(made)).collect::<Result<Vec<u32>, _>>()?;
         let (own, fields) = (numbers.span(node)?, info.fields.len());
         let mut star = 0;
@@ -482,9 +572,7 @@ impl<'a> Assembly<'a> {
             let vertex = points.binary_search(&rows.vertices[i]).map_err(|_| unknown)? as u32;
             let sides = vertices.further(vertex, fields);
             let levels = vertices.levels(vertex, fields);
-            // That there is one has been checked.
-            let near = vertex_of.get(rows.near[i] as usize).copied().unwrap_or(NONE);
-            let offset = rows.offsets[i];
+            let (near, offset) = (known.of(rows.near[i]), rows.offsets[i]);
             let next = NextUpdate { near, offset, levels, sides: &sides, errors: &errors, faces: &[] };
             builder.push(&next, removers.zip(inner)).map_err(BuildError::from)?;
             star = inserted.end;
