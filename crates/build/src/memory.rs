@@ -74,7 +74,8 @@ fn after_parting(
         let joined = each.saturating_mul(132 + 8 * fields).saturating_add(in_blocks);
         joining = joining.max(joined.saturating_mul(joins_at_a_time.min(nodes).into()));
     }
-    let assembling = largest.saturating_mul(130).saturating_add(of_points(4 + 4 * fields));
+    // At first there is a number for each vertex, then one node at a time, and what upper levels have of errors.
+    let assembling = largest.saturating_mul(130).saturating_add(of_points(2 * fields)).max(of_points(4));
     let assembling = assembling.saturating_add(of_points(20).min(SORTED));
     // Of what has been freed, allocators keep some for each thread.
     let kept = if parts_at_a_time > 1 { part / 2 } else { 0 };
