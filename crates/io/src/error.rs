@@ -221,7 +221,7 @@ pub(super) enum Stop {
 
 impl Stop {
     /// The error where a file that could be read by parts was changed since.
-    pub fn as_changed(self) -> ReadError {
+    pub fn into_changed(self) -> ReadError {
         match self {
             Self::Read(error) => error,
             Self::Whole(why) => {

@@ -7,7 +7,7 @@ use crate::error::{At, ReadError, ReadReason};
 use tetralod::mesh::{Grid, TetMesh};
 
 /// Most values of a field that are read at once where all of them pass by.
-pub(super) const MOST_IN_SLAB: u64 = 1 << 20;
+const MOST_IN_SLAB: u64 = 1 << 20;
 
 /// The points in a box of a grid.
 pub(super) type Points = [Range<u32>; 3];

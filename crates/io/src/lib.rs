@@ -59,6 +59,7 @@ mod grid;
 mod grid_boxes;
 mod grid_parts;
 mod image;
+mod image_boxes;
 mod in_memory;
 mod legacy;
 mod listed;

@@ -16,7 +16,7 @@ use crate::formats::exodus_pieces::{Decomposition, ExodusPieces};
 #[cfg(feature = "hdf5")]
 use crate::formats::vtkhdf_ranges::HdfFile;
 use crate::grid_boxes::GridInParts;
-use crate::image::ImageFile;
+use crate::image_boxes::ImageFile;
 use crate::listed::{for_each_file, names};
 use crate::pvtu::{Identity, bits};
 use crate::ranges::{Each, InPieces};
@@ -189,7 +189,7 @@ impl Pieces {
             Content::File(file) => file.for_each(&self.options, each),
             Content::Grid(_) => Err(Stop::Whole("it is a grid")),
         };
-        read.map_err(Stop::as_changed)
+        read.map_err(Stop::into_changed)
     }
 
     fn read_listed(&self, document: &Document<'_>, each: Each<'_>) -> Result<(), ReadError> {

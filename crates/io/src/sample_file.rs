@@ -29,6 +29,10 @@ fn samples_in_file(path: &Path, options: &ReadOptions) -> Option<(PathBuf, Start
         let sidecar = sidecar(&files).ok()?;
         return Some((samples_path(&files, &sidecar), Start::At(0), Samples::Raw(sidecar)));
     }
+    // Pipes and the like are read once.
+    if !path.metadata().is_ok_and(|of_file| of_file.is_file()) {
+        return None;
+    }
     let mut head = Vec::new();
     File::open(path).ok()?.take(MOST_OF_HEADER).read_to_end(&mut head).ok()?;
     let (volume, file, start) = in_file(&head)?;

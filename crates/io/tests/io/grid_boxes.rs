@@ -252,3 +252,25 @@ fn parts_are_those_of_all_values() {
         }
     }
 }
+
+#[test]
+fn boxes_that_were_read_before_take_no_memory() {
+    let folder = Folder::new("boxes-memory");
+    let style = Style { format: Format::AppendedRaw, ..Style::PLAIN };
+    folder.write("b.json", sample_sidecar("float32", "little").as_bytes());
+    let header = "NRRD0005\ntype: short\ndimension: 3\nsizes: 4 3 2\nencoding: raw\nendian: big\n\n";
+    let nrrd = [header.as_bytes(), &numbers("Int16", &samples(1), true)].concat();
+    let files = [
+        folder.write("a.vti", &sample_vti(style)),
+        folder.write("b.raw", &numbers("Float32", &samples(1), false)),
+        folder.write("c.nrrd", &nrrd),
+    ];
+    for path in files {
+        let options = ReadOptions { memory: io::MemoryLimit::of(1 << 12), ..ReadOptions::default() };
+        let pieces = open(&path, &options).expect("no error").expect("in parts");
+        let grid = pieces.grid().expect("a grid");
+        for _ in 0..100 {
+            assert_eq!(grid.values(0, [0..4, 0..3, 0..2]).expect("a box").len(), 24, "{}", path.display());
+        }
+    }
+}
