@@ -12,7 +12,7 @@ use crate::{shell, venv};
 const SOURCES: &str = "workflows";
 const FOLDER: &str = "target/workflows";
 
-/// How many parts: enough for three levels.
+/// How many parts: enough for four levels.
 const PARTS: u32 = 16;
 
 /// Options of `build`.
@@ -131,9 +131,9 @@ impl Run {
         let all = found.len();
         found.dedup();
         ensure!(all == found.len() + 1, "{name}: steps that were finished were done again:\n{text}");
-        // The parts, two nodes over eight of them each, one over these, the first step and the last.
+        // The parts, the nodes of three levels above them, the first step and the last.
         ensure!(
-            found.len() as u32 == PARTS + 2 + 1 + 2,
+            found.len() as u32 == PARTS + 8 + 2 + 1 + 2,
             "{name}: these are not the steps that are needed:\n{text}"
         );
         Ok(())
