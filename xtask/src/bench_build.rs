@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use crate::benchmarks_page::{self, Part};
@@ -69,10 +69,7 @@ struct Way {
 
 /// Measures grids of these sizes; only all of them together are written to the page.
 pub fn run(sizes: &[String]) -> Result<()> {
-    let size = |text: &String| text.parse().ok().filter(|size| (9..=1024).contains(size));
-    let Some(only) = sizes.iter().map(size).collect::<Option<Vec<u32>>>() else {
-        bail!("`bench --build` takes points along an edge of the grids, 9 to 1024, or nothing");
-    };
+    let only = parsed("--build", 9, sizes)?;
     let tetralod = shell::released_command()?;
     std::fs::create_dir_all(FOLDER)?;
     let mut times =
@@ -116,6 +113,15 @@ pub fn run(sizes: &[String]) -> Result<()> {
     let table = [&times, FOUND, &found, &verified].concat();
     println!("{table}");
     if only.is_empty() { benchmarks_page::write(Part::Builds, &[HEAD, &table].concat()) } else { Ok(()) }
+}
+
+/// The points along an edge of the grids that an option is given, which takes no fewer than `least`.
+pub fn parsed(option: &str, least: u32, sizes: &[String]) -> Result<Vec<u32>> {
+    let size = |text: &String| text.parse().ok().filter(|size| (least..=1024).contains(size));
+    let all: Option<Vec<u32>> = sizes.iter().map(size).collect();
+    all.with_context(|| {
+        format!("`bench {option}` takes points along an edge of the grids, {least} to 1024, or nothing")
+    })
 }
 
 /// Of a grid of `size`³ points, each of whose cells has six.

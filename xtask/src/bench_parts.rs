@@ -5,10 +5,10 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
-use crate::bench_build::{measured, number, tetrahedra};
+use crate::bench_build::{measured, number, parsed, tetrahedra};
 use crate::benchmarks_page::{self, Part};
 use crate::shell;
 
@@ -41,10 +41,7 @@ struct Step {
 
 /// Measures grids of these sizes; only all of them together, with the workers, are written to the page.
 pub fn run(sizes: &[String]) -> Result<()> {
-    let size = |text: &String| text.parse().ok().filter(|size| (17..=1024).contains(size));
-    let Some(only) = sizes.iter().map(size).collect::<Option<Vec<u32>>>() else {
-        bail!("`bench --parts` takes points along an edge of the grids, 17 to 1024, or nothing");
-    };
+    let only = parsed("--parts", 17, sizes)?;
     let tetralod = shell::released_command()?;
     std::fs::create_dir_all(FOLDER)?;
     let mut table =
