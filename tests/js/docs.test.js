@@ -43,6 +43,7 @@ const ELSEWHERE = {
     "sh: the commands that run all tests and make wheels; `release` of xtask compiles the command with the page, cli/tests/command/view.rs views; containers need an engine, `release` lints what builds them",
   ],
   "docs/README.md": ["sh: cli/tests/command/view.rs views"],
+  "docs/benchmarks.md": ["text: a plot that `cargo xtask bench --parts` makes"],
   "docs/command.md": ["sh: `release` of xtask compiles the command with the page; cli/tests/command/html.rs makes pages"],
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
