@@ -17,11 +17,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use tetralod::format::{BlockEncoder, EncodeOptions};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::Mt;
+use tetralod::mt::{Exact, Mt};
 use tetralod_build::parts::{
     self, Assembled, GridValues, Node, Part, PartUpdates, PartsError, Piecewise, Plan, PointBox,
 };
-use tetralod_build::{BuildConfig, BuildProgress, BuildResult, BuildSummary, OnProgress};
+use tetralod_build::{BuildConfig, BuildProgress, BuildSummary, OnProgress};
 use tetralod_io::{GridInParts, Pieces};
 
 /// Parses `I/N`: a part and how many there are.
@@ -307,14 +307,6 @@ impl Folder<'_> {
             let path = self.built(node);
             read(&path, &command_for(node, plan), Part::read_mesh).map_err(PartsError::other)
         };
-        if plan.keeps_exact_values() {
-            // They are compared with the whole MT.
-            let made = |progress: OnProgress<'_>| parts::assemble(plan, &left, &updates, progress);
-            let BuildResult { mt, summary, exact, .. } = with_progress(verbosity, made)?.map_err(said)?;
-            let write = |path: &Path| files::write_mt(path, &mt, exact, to.metadata.clone());
-            let bytes = to.sharding.write(to.path, write)?;
-            return Ok(Written { mt, summary, bytes });
-        }
         files::in_folder_beside(to.path, |folder| {
             let mut shelf = BlockFiles::new(folder);
             let mut encoder = BlockEncoder::new(&mut shelf);
@@ -323,11 +315,12 @@ impl Folder<'_> {
             let made = with_progress(verbosity, |progress| {
                 parts::assemble_blocks(plan, (&left, &updates), &scratch, take, progress)
             });
-            let Assembled { builder, summary, .. } = made?.map_err(said)?;
+            let Assembled { builder, summary, exact } = made?.map_err(said)?;
             let (options, mut mt) = (EncodeOptions::complete(Vec::new(), to.metadata.clone()), None);
             let bytes = to.sharding.write(to.path, |path| {
                 files::write_file(path, |out| {
-                    let (written, bytes) = encoder.finish(builder, &options, out)?;
+                    let (written, bytes) =
+                        encoder.finish(builder, || exact.tables(Exact::IN_A_SECTION), &options, out)?;
                     mt = Some(written.into());
                     Ok(bytes)
                 })

@@ -61,20 +61,25 @@ fn encode_kind<C: Codec>(
     blocks.iter_mut().zip(&of_blocks).for_each(|(block, sections)| block.lengths = lengths(sections));
     let mut file = File::begin(mt, &models, (options, scan.histograms.as_ref()), blocks)?;
     file.has_exact = !mt.info().kind.is_paged() && !exact.is_empty();
-    file.of_blocks = of_blocks.iter().flatten().map(|section| (section.len(), section.head.crc)).collect();
+    let mut sections: Vec<Section> = of_blocks.into_iter().flatten().collect();
     for (field, corrections) in &exact {
-        let head = [*field, u32::from(!corrections.is_single()), corrections.count()];
-        file.behind.push(Section::coded(Kind::EXACT, &head, &models, |out| corrections.put(out))?);
+        sections.push(exact_section(*field, corrections, &models)?);
     }
-    file.write(mt, writer, &mut |put| of_blocks.iter().flatten().try_for_each(|section| section.put(put)))
+    file.behind = sections.iter().map(Section::sum).collect();
+    file.write(mt, writer, &mut |put| sections.iter().try_for_each(|section| section.put(put)))
 }
 
-/// All that a file has, but for its blocks themselves.
+/// The section of some exact values of a field.
+pub fn exact_section(field: u32, corrections: &Corrections, models: &Models) -> Result<Section, EncodeError> {
+    let head = [field, u32::from(!corrections.is_single()), corrections.count()];
+    Section::coded(Kind::EXACT, &head, models, |out| corrections.put(out))
+}
+
+/// All that a file has, but for its blocks and exact values themselves.
 pub struct File {
     front: Vec<Section>,
-    /// The bytes and the checksum of each section of the blocks.
-    pub of_blocks: Vec<(u64, u32)>,
-    behind: Vec<Section>,
+    /// The bytes and the checksum of each section of these.
+    pub behind: Vec<(u64, u32)>,
     index_pages: bool,
     has_exact: bool,
 }
@@ -113,22 +118,20 @@ impl File {
         front.extend(shared);
         front.extend(pages);
         let index_pages = index.is_paged();
-        Ok(Self { front, of_blocks: Vec::new(), behind: Vec::new(), index_pages, has_exact: false })
+        Ok(Self { front, behind: Vec::new(), index_pages, has_exact: false })
     }
 
-    /// Writes it; `put_blocks` puts all sections of the blocks. Returns the bytes of the file.
+    /// Writes it; `put_behind` puts all sections of the blocks and exact values. Returns the bytes of the file.
     pub fn write<C: Codec>(
         &self,
         mt: &C,
         writer: &mut dyn io::Write,
-        put_blocks: &mut dyn FnMut(PutBytes<'_>) -> Result<(), EncodeError>,
+        put_behind: &mut dyn FnMut(PutBytes<'_>) -> Result<(), EncodeError>,
     ) -> Result<u64, EncodeError> {
-        let sums = |section: &Section| (section.len(), section.head.crc);
-        let front = self.front.iter().map(sums).chain(self.of_blocks.iter().copied());
         let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
         let mut totals = Totals { updates: mt.updates(), sections: 0, crc: 0 };
         let mut chain = checksum::Hasher::new();
-        for (len, crc) in front.chain(self.behind.iter().map(sums)) {
+        for (len, crc) in self.front.iter().map(Section::sum).chain(self.behind.iter().copied()) {
             total += len;
             totals.sections += 1;
             chain.update(&crc.to_le_bytes());
@@ -145,8 +148,8 @@ impl File {
             exact: self.has_exact,
         }))?;
         self.front.iter().try_for_each(|section| section.put(put))?;
-        put_blocks(put)?;
-        self.behind.iter().chain([&end]).try_for_each(|section| section.put(put))?;
+        put_behind(put)?;
+        end.put(put)?;
         writer.flush().map_err(EncodeError::Write)?;
         Ok(total)
     }
@@ -212,7 +215,7 @@ fn shared_sections<C: Codec>(
     Ok(shared)
 }
 
-/// What is to be written of exact values: by field, ascending.
+/// What is to be written of exact values, for each section: by field, ascending.
 fn corrections(
     mt: &impl Codec,
     exact: &[Exact],
@@ -225,8 +228,9 @@ fn corrections(
             let field = mt.info().fields.get(exact.field)?;
             Some(field.value(*reference[place].1.get(exact.field)?))
         };
-        let corrections = Corrections::new(exact, of_level);
-        all.push((exact.field as u32, corrections.ok_or(EncodeError::Exact { field: exact.field })?));
+        let corrections =
+            Corrections::new(exact, of_level).ok_or(EncodeError::Exact { field: exact.field })?;
+        all.extend(corrections.in_sections().map(|some| (exact.field as u32, some)));
     }
     all.sort_by_key(|(field, _)| *field);
     Ok(all)

@@ -1,7 +1,8 @@
 //! The file of a half-edge MT that is written while it is made: the MT is never in memory as a whole.
 //!
 //! Symbols are coded by tables of how often they occur in the whole file, and the index in front of the blocks says how long each is. So
-//! blocks are put aside when they are whole, coded by tables that know nothing; at the end each is coded again.
+//! blocks are put aside when they are whole, coded by tables that know nothing; at the end each is coded again. Exact values, which are
+//! behind the blocks, are not needed before that.
 //!
 //! ```text
 //!     builder ──▶ block, whole ──▶ counts
@@ -14,15 +15,16 @@
 
 use super::block_scan::{block_info, check_order, largest_errors};
 use super::coder::{Counts, Models};
-use super::encode::{File, check, models};
+use super::encode::{File, check, exact_section, models};
 use super::payload;
 use super::payload::codec::Codec;
+use super::payload::exact::Corrections;
 use super::payload::half_edge::{recoded, sections_of};
 use super::payload::histogram::Histograms;
 use super::payload::index::BlockInfo;
 use super::section::Section;
 use super::{EncodeError, EncodeOptions};
-use crate::mt::{ErrorCode, HalfEdgeBuilder, HalfEdgeMt, MultiTessellation, UpdatePages};
+use crate::mt::{ErrorCode, Exact, HalfEdgeBuilder, HalfEdgeMt, MultiTessellation, UpdatePages};
 use crate::threads;
 use std::io;
 
@@ -42,7 +44,7 @@ pub trait BlockShelf {
     fn get(&self, block: u32) -> io::Result<Vec<u8>>;
 }
 
-/// Writes the file of an MT while it is made. The same bytes as [`encode_to`](super::encode_to) writes of the whole MT, which keeps no exact values.
+/// Writes the file of an MT while it is made. The same bytes as [`encode_to`](super::encode_to) writes of the whole MT.
 #[doc(hidden)]
 pub struct BlockEncoder<'a> {
     shelf: &'a mut dyn BlockShelf,
@@ -76,18 +78,21 @@ impl<'a> BlockEncoder<'a> {
         self.shelf.put(block, &bytes).map_err(EncodeError::Write)
     }
 
-    /// Writes the file, once all updates have come. Returns the MT without its updates, and the bytes of the file.
+    /// Writes the file, once all updates have come. `exact` gives the exact values, and is called twice: tables of at most
+    /// [`Exact::IN_A_SECTION`] vertices, fields and vertices ascending, instead of those of the options. Returns the MT without its updates, and the
+    /// bytes of the file.
     ///
     /// # Errors
-    /// As [`encode_to`](super::encode_to), and if the builder has not all updates.
-    pub fn finish(
+    /// As [`encode_to`](super::encode_to), if the builder has not all updates, and those of `exact`.
+    pub fn finish<E: Iterator<Item = io::Result<Exact>>>(
         mut self,
         mut builder: HalfEdgeBuilder,
+        exact: impl Fn() -> E,
         options: &EncodeOptions,
         writer: &mut dyn io::Write,
     ) -> Result<(HalfEdgeMt, u64), EncodeError> {
         builder.take_pages(true, &mut |mt, page| self.take(mt, page))?;
-        let Self { shelf, even, counts, errors } = self;
+        let Self { shelf, even, mut counts, errors } = self;
         let (mt, facts, reaches) = builder.finish_without_reaches().map_err(EncodeError::Unmade)?;
         let (updates, expected) = (mt.updates(), mt.info().updates);
         if updates != expected {
@@ -95,6 +100,9 @@ impl<'a> BlockEncoder<'a> {
         }
         check(&mt)?;
         check_order(&facts, options)?;
+        for table in exact() {
+            corrections(&mt, &table.map_err(EncodeError::Write)?)?.put(&mut counts);
+        }
         let models = models(counts, &mt);
         let mut blocks: Vec<BlockInfo> = reaches
             .finish()
@@ -103,7 +111,7 @@ impl<'a> BlockEncoder<'a> {
             .map(|(extent, errors)| block_info(extent, errors))
             .collect();
         let all = blocks.len() as u32;
-        let mut of_blocks = Vec::new();
+        let mut behind = Vec::new();
         for first in (0..all).step_by(AT_A_TIME as usize) {
             let some = first..all.min(first + AT_A_TIME);
             let aside: Vec<Vec<u8>> = some
@@ -119,17 +127,35 @@ impl<'a> BlockEncoder<'a> {
                 shelf.put(block, &joined(&sections)).map_err(EncodeError::Write)?;
                 blocks[block as usize].lengths =
                     sections.iter().map(|section| section.len() as u32).collect();
-                of_blocks.extend(sections.iter().map(|section| (section.len(), section.head.crc)));
+                behind.extend(sections.iter().map(Section::sum));
             }
+        }
+        let mut aside = all;
+        for table in exact() {
+            let table = table.map_err(EncodeError::Write)?;
+            let section = exact_section(table.field as u32, &corrections(&mt, &table)?, &models)?;
+            shelf.put(aside, &joined(std::slice::from_ref(&section))).map_err(EncodeError::Write)?;
+            behind.push(section.sum());
+            aside += 1;
         }
         let histograms = options.histograms.then(|| Histograms::of(&facts.volumes));
         let mut file = File::begin(&mt, &models, (options, histograms.as_ref()), blocks)?;
-        file.of_blocks = of_blocks;
+        file.behind = behind;
         let bytes = file.write(&mt, writer, &mut |put| {
-            (0..all).try_for_each(|block| put(&shelf.get(block).map_err(EncodeError::Write)?))
+            (0..aside).try_for_each(|block| put(&shelf.get(block).map_err(EncodeError::Write)?))
         })?;
         Ok((mt, bytes))
     }
+}
+
+/// The corrections of exact values, whose levels are those that are nearest to them.
+fn corrections(mt: &HalfEdgeMt, exact: &Exact) -> Result<Corrections, EncodeError> {
+    let field = mt.info().fields.get(exact.field);
+    let level = |vertex| {
+        let (field, value) = (field?, exact.get(vertex)?);
+        Some(field.value(field.nearest(value)))
+    };
+    Corrections::new(exact, level).ok_or(EncodeError::Exact { field: exact.field })
 }
 
 /// Sections as they are in a file.

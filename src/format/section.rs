@@ -50,6 +50,11 @@ impl Section {
         put(&self.payload)
     }
 
+    /// The bytes with the head, and the checksum.
+    pub fn sum(&self) -> (u64, u32) {
+        (self.len(), self.head.crc)
+    }
+
     /// Bytes with the head.
     pub fn len(&self) -> u64 {
         (HEAD_BYTES + self.payload.len()) as u64

@@ -24,6 +24,10 @@ pub enum ExactValues {
 }
 
 impl Exact {
+    /// Files have the values of at most so many vertices in one section.
+    #[doc(hidden)]
+    pub const IN_A_SECTION: u32 = 1 << 14;
+
     /// A table of these values, in single precision if that holds every one of them.
     pub fn new(field: usize, mut values: Vec<(VertexId, f64)>) -> Self {
         values.sort_unstable_by_key(|&(vertex, _)| vertex);

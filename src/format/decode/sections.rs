@@ -320,15 +320,27 @@ impl Decoder {
         let (FileHead { info: Some(info), models: Some(models), .. }, 0 | 1) = (&self.head, precision) else {
             return Err(content.out_of_place());
         };
-        let is_new = self.exact.iter().all(|(known, _)| *known < field);
-        if field >= info.fields.len() || !is_new || count > info.vertices {
-            return Err(content.corrupt("exact values are not those of a field"));
+        let wrong = content.corrupt("exact values are not those of a field");
+        let (before, is_ascending) = match self.exact.last() {
+            Some((known, before)) if *known == field => (before.count(), true),
+            last => (0, last.is_none_or(|(known, _)| *known < field)),
+        };
+        let is_in_all = count.checked_add(before).is_some_and(|all| all <= info.vertices);
+        if field >= info.fields.len() || !is_ascending || !is_in_all {
+            return Err(wrong);
         }
         if self.head.place(field).is_some() {
             let mut source = Source::new(content, models)?;
             let corrections = Corrections::read(&mut source, precision == 0, count)?;
             source.end()?;
-            self.exact.push((field, corrections));
+            match self.exact.last_mut().filter(|(known, _)| *known == field) {
+                Some((_, before)) => {
+                    if !before.extend(corrections) {
+                        return Err(wrong);
+                    }
+                }
+                None => self.exact.push((field, corrections)),
+            }
         }
         Ok(())
     }

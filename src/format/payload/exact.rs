@@ -52,6 +52,27 @@ impl Corrections {
         self.vertices.len() as u32
     }
 
+    /// Those of each section.
+    pub(crate) fn in_sections(&self) -> impl Iterator<Item = Self> {
+        let most = Exact::IN_A_SECTION as usize;
+        self.vertices.chunks(most).zip(self.steps.chunks(most)).map(|(vertices, steps)| Self {
+            is_single: self.is_single,
+            vertices: vertices.to_vec(),
+            steps: steps.to_vec(),
+        })
+    }
+
+    /// Takes in those of the next section, of vertices behind these. Whether it is one of the same values.
+    pub(crate) fn extend(&mut self, next: Self) -> bool {
+        let is_behind = next.vertices.first().is_none_or(|first| self.vertices.last() < Some(first));
+        let goes_on = is_behind && next.is_single == self.is_single;
+        if goes_on {
+            self.vertices.extend(next.vertices);
+            self.steps.extend(next.steps);
+        }
+        goes_on
+    }
+
     pub(crate) fn put(&self, out: &mut impl Put) {
         let mut next = 0;
         for (&vertex, &step) in self.vertices.iter().zip(&self.steps) {

@@ -32,6 +32,25 @@ pub fn read(mut payload: Bytes<'_>, tables: &[Vec<(u32, u32)>]) -> Exact {
     Exact { field, precision, corrections }
 }
 
+/// Those of each field, which may be in several sections.
+pub fn joined(sections: impl Iterator<Item = Exact>) -> Vec<Exact> {
+    let mut all: Vec<Exact> = Vec::new();
+    for section in sections {
+        match all.last_mut() {
+            Some(before) if before.field == section.field => {
+                assert_eq!(before.precision, section.precision);
+                assert!(
+                    before.corrections.last().map(|last| last.0)
+                        < section.corrections.first().map(|first| first.0)
+                );
+                before.corrections.extend(section.corrections);
+            }
+            _ => all.push(section),
+        }
+    }
+    all
+}
+
 impl Exact {
     /// The exact value, given that of the level.
     pub fn value(&self, of_level: f64, correction: i64) -> f64 {

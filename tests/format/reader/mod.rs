@@ -176,7 +176,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     }
     assert!(known.next().is_none());
     let values = front.iter().filter(|section| &section.kind == b"fldx");
-    let exact: Vec<Exact> = values.map(|section| exact::read(section.payload, &tables)).collect();
+    let exact = exact::joined(values.map(|section| exact::read(section.payload, &tables)));
     assert!(exact.windows(2).all(|pair| pair[0].field < pair[1].field));
     check_end(end, front, &info);
     let splits = HashMap::new();

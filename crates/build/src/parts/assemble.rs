@@ -3,7 +3,7 @@
 //! Each node has ordered its own updates into blocks. They are numbered from the last node down to the parts, which extends the partial order, and
 //! appended in this order, as for a whole. The mesh to which they are applied is never there as a whole: what is left of a node is all that its
 //! own updates remove, a patch. Nor is the MT, unless it is asked for: whole blocks are taken as they come, and which updates there are beside which
-//! vertex is kept in the scratch, and so is the number of each vertex. In memory is one node, and what upper levels have of errors.
+//! vertex is kept in the scratch, and so are the number of each vertex and exact values. In memory is one node, and what upper levels have of errors.
 //!
 //! ```text
 //!     updates of all nodes ──▶ what each inserts, beside which vertex ──▶ by vertices, in the scratch
@@ -14,6 +14,7 @@
 
 use super::PartsError;
 use super::children::{ChildSorter, Children};
+use super::exact_values::ExactInScratch;
 use super::piece::{Made, Part, PartUpdates, Piece, Remover, RemoverCode, Sided, UpdateRows};
 use super::plan::{Node, Plan};
 use crate::decimate::append;
@@ -25,8 +26,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use tetralod::mesh::NONE;
 use tetralod::mt::{
-    BaseMark, BaseMesh, ErrorCode, Exact, FieldInfo, Forest, ForestChild, HalfEdgeBuilder, MtInfo,
-    NextUpdate, Patch, VertexId, by_corner, further_regions,
+    BaseMark, BaseMesh, ErrorCode, FieldInfo, Forest, ForestChild, HalfEdgeBuilder, MtInfo, NextUpdate,
+    Patch, VertexId, by_corner, further_regions,
 };
 
 /// Gives what has been made of a node.
@@ -36,12 +37,15 @@ type Of<'a, T> = &'a dyn Fn(Node) -> Result<T, PartsError>;
 type OnBlocks<'a> = &'a mut dyn FnMut(&mut HalfEdgeBuilder) -> Result<(), PartsError>;
 
 /// What [`assemble_blocks`] has made.
-pub struct Assembled {
+pub struct Assembled<'a> {
     /// With all updates, of which blocks may have been taken.
     #[doc(hidden)]
     pub builder: HalfEdgeBuilder,
     /// What is known of the MT.
     pub summary: BuildSummary,
+    /// The exact values of lossless fields.
+    #[doc(hidden)]
+    pub exact: ExactInScratch<'a>,
 }
 
 /// Makes the MT: `left` gives what is left of every node of the plan ([`Plan::nodes`]), that of the last one several times, and `updates` those of
@@ -57,10 +61,10 @@ pub fn assemble(
 ) -> Result<BuildResult, PartsError> {
     let scratch = InMemory::default();
     let (made, numbers) = assembled(plan, (left, updates), &scratch, &mut |_| Ok(()), progress)?;
-    let Assembled { builder, summary } = made;
+    let Assembled { builder, summary, exact } = made;
     let mt = builder.finish().map_err(BuildError::from)?;
     let vertices: Vec<VertexId> = numbers.all()?.into_iter().map(VertexId).collect();
-    let exact = exact(plan, left, &vertices)?;
+    let exact = exact.tables(u32::MAX).collect::<Result<_, _>>()?;
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
 
@@ -69,13 +73,13 @@ pub fn assemble(
 ///
 /// # Errors
 /// As [`assemble`], and those of `take`.
-pub fn assemble_blocks(
-    plan: &Plan,
+pub fn assemble_blocks<'a>(
+    plan: &'a Plan,
     (left, updates): (Of<'_, Part<'_>>, Of<'_, PartUpdates>),
-    scratch: &dyn Scratch,
+    scratch: &'a dyn Scratch,
     take: OnBlocks<'_>,
     progress: OnProgress<'_>,
-) -> Result<Assembled, PartsError> {
+) -> Result<Assembled<'a>, PartsError> {
     let (made, numbers) = assembled(plan, (left, updates), scratch, take, progress)?;
     numbers.remove()?;
     Ok(made)
@@ -88,12 +92,12 @@ fn assembled<'a>(
     scratch: &'a dyn Scratch,
     take: OnBlocks<'_>,
     progress: OnProgress<'_>,
-) -> Result<(Assembled, VertexNumbers<'a>), PartsError> {
+) -> Result<(Assembled<'a>, VertexNumbers<'a>), PartsError> {
     let listed = Listed::read(plan, updates, scratch)?;
     let (assembly, summary) = Assembly::begin(plan, piece_of(plan, plan.nodes()[0], left)?, listed)?;
-    let (builder, numbers) = assembly.append_all((left, updates), take, progress)?;
+    let Assembly { builder, vertices, exact, .. } = assembly.append_all((left, updates), take, progress)?;
     let summary = BuildSummary { depth: builder.depth(), ..summary };
-    Ok((Assembled { builder, summary }, numbers))
+    Ok((Assembled { builder, summary, exact }, vertices))
 }
 
 /// What is left of a node, without what only joins need.
@@ -386,6 +390,7 @@ struct Assembly<'a> {
     vertices: VertexNumbers<'a>,
     numbers: Numbers,
     children: Children<'a>,
+    exact: ExactInScratch<'a>,
     done: usize,
 }
 
@@ -416,6 +421,9 @@ impl<'a> Assembly<'a> {
         let (starts, of_base) = children.of(&labels)?;
         let places = append::points_of(&numbered);
         let names: Vec<u32> = places.iter().map(|&at| piece.points[at as usize]).collect();
+        let lossless = (0..info.fields.len()).filter(|&f| plan.fields[f].lossless).collect();
+        let mut exact = ExactInScratch::new(listed.scratch, lossless, plan.counts.0);
+        exact.put(0, rows_of(&piece.values, info.fields.len(), &places))?;
         let forest = Forest::of(&labels, names.clone(), starts, of_base);
         let unknown = PartsError::Damaged { what: OTHER_REGIONS };
         let regions = plan.regions.as_ref().map(|regions| regions.of_base(&piece.regions).ok_or(unknown));
@@ -425,16 +433,16 @@ impl<'a> Assembly<'a> {
         let builder = append::begin(described, base, &base_marks, points, forest, plan.block_bits)?;
         let vertices = VertexNumbers::keep(listed.scratch, number)?;
         let numbers = listed.numbers;
-        Ok((Self { plan, info, builder, vertices, numbers, children, done: 0 }, summary))
+        Ok((Self { plan, info, builder, vertices, numbers, children, exact, done: 0 }, summary))
     }
 
-    /// Returns the builder with all updates, and the MT's vertex for each reference vertex, which stays in the scratch.
+    /// Appends all updates.
     fn append_all(
         mut self,
         (left, updates): (Of<'_, Part<'_>>, Of<'_, PartUpdates>),
         take: OnBlocks<'_>,
         progress: OnProgress<'_>,
-    ) -> Result<(HalfEdgeBuilder, VertexNumbers<'a>), PartsError> {
+    ) -> Result<Self, PartsError> {
         for level in self.plan.nodes().chunk_by(|a, b| a.level == b.level) {
             for &node in level {
                 let piece = piece_of(self.plan, node, left)?;
@@ -445,7 +453,7 @@ impl<'a> Assembly<'a> {
             take(&mut self.builder)?;
         }
         self.children.remove()?;
-        Ok((self.builder, self.vertices))
+        Ok(self)
     }
 
     /// Appends the updates of a node to what is left of it: those that are left over from blocks come behind those of the other nodes of its level.
@@ -464,8 +472,9 @@ impl<'a> Assembly<'a> {
         let known = self.vertices.of(piece.points.iter().chain(&rows.vertices).chain(&rows.near))?;
         let patch = self.patch(&piece, &vertices, &rows, &known)?;
         self.builder.start_patch(patch).map_err(BuildError::from)?;
-        let Piece { points, .. } = piece;
-        let reference = (&points[..], &vertices, &known);
+        let Piece { points, values, .. } = piece;
+        let values = if self.exact.is_empty() { Vec::new() } else { values };
+        let reference = (&points[..], &values[..], &vertices, &known);
         let (in_blocks, left_over) = rows.split(in_blocks as usize, self.info.fields.len());
         self.append(node, first, &in_blocks, reference, progress)?;
         if !left_over.vertices.is_empty() {
@@ -546,18 +555,23 @@ impl<'a> Assembly<'a> {
         })
     }
 
-    /// Appends updates of a node, numbered from `first` on, given its reference vertices, which ascend.
+    /// Appends updates of a node, numbered from `first` on, given its reference vertices, which ascend, and their values if some are kept exactly.
     fn append(
         &mut self,
         node: Node,
         first: u32,
         rows: &UpdateRows,
-        (points, vertices, known): (&[u32], &Vertices, &KnownNumbers),
+        (points, values, vertices, known): (&[u32], &[f64], &Vertices, &KnownNumbers),
         progress: OnProgress<'_>,
     ) -> Result<(), PartsError> {
-        let Self { builder, numbers, done, info, .. } = self;
+        let Self { builder, numbers, exact, done, info, .. } = self;
         let earlier = rows.earlier.iter().map(|&made| numbers.of(made)).collect::<Result<Vec<u32>, _>>()?;
         let (own, fields) = (numbers.span(node)?, info.fields.len());
+        let place = |point: &u32| points.binary_search(point).map(|place| place as u32);
+        let places = rows.vertices.iter().map(place).collect::<Result<Vec<u32>, _>>();
+        let places = places.map_err(|_| PartsError::Damaged { what: OTHER_POINTS })?;
+        let base = self.plan.counts.0 - info.updates;
+        exact.put(base + first, rows_of(values, fields, &places))?;
         let mut star = 0;
         for (i, (number, errors)) in (first as usize..).zip(rows.errors.chunks(fields)).enumerate() {
             BuildProgress::tell_ordered(*done, info.updates as usize, progress)?;
@@ -568,8 +582,7 @@ impl<'a> Assembly<'a> {
             }
             let errors: Vec<ErrorCode> = errors.iter().copied().map(ErrorCode).collect();
             let inner = rows.inner[inserted.clone()].iter().copied();
-            let unknown = PartsError::Damaged { what: OTHER_POINTS };
-            let vertex = points.binary_search(&rows.vertices[i]).map_err(|_| unknown)? as u32;
+            let vertex = places[i];
             let sides = vertices.further(vertex, fields);
             let levels = vertices.levels(vertex, fields);
             let (near, offset) = (known.of(rows.near[i]), rows.offsets[i]);
@@ -582,6 +595,15 @@ impl<'a> Assembly<'a> {
     }
 }
 
+/// The values of all fields at some points.
+fn rows_of<'v>(
+    values: &'v [f64],
+    fields: usize,
+    places: &'v [u32],
+) -> impl Iterator<Item = &'v [f64]> + Clone {
+    places.iter().map(move |&place| &values[place as usize * fields..][..fields])
+}
+
 /// The number in the MT of what removes a tetrahedron; [`NONE`] if nothing does.
 fn remover(code: RemoverCode, own: Span, earlier: &[u32]) -> u32 {
     match code.into() {
@@ -589,26 +611,6 @@ fn remover(code: RemoverCode, own: Span, earlier: &[u32]) -> u32 {
         Remover::Own(update) => own.of(update),
         Remover::Earlier(place) => earlier[place as usize],
     }
-}
-
-/// The exact values of the lossless fields.
-fn exact(plan: &Plan, left: Of<'_, Part<'_>>, vertices: &[VertexId]) -> Result<Vec<Exact>, PartsError> {
-    if !plan.keeps_exact_values() {
-        return Ok(Vec::new());
-    }
-    let fields = plan.fields.len();
-    let mut values = vec![0.0; vertices.len() * fields];
-    for node in plan.nodes().into_iter().filter(|node| node.level == 0) {
-        let Piece { points, values: own, .. } = piece_of(plan, node, left)?;
-        for (&point, own) in points.iter().zip(own.chunks(fields)) {
-            values[point as usize * fields..][..fields].copy_from_slice(own);
-        }
-    }
-    let of = |f: usize| {
-        let own = vertices.iter().copied();
-        Exact::new(f, own.zip(values.iter().skip(f).step_by(fields).copied()).collect())
-    };
-    Ok((0..fields).filter(|&f| plan.fields[f].lossless).map(of).collect())
 }
 
 #[cfg(test)]

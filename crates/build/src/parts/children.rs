@@ -132,7 +132,7 @@ impl Children<'_> {
     }
 
     /// Removes what was kept.
-    pub fn remove(self) -> io::Result<()> {
+    pub fn remove(&self) -> io::Result<()> {
         self.scratch.remove(CHILDREN)?;
         self.scratch.remove(STARTS)
     }

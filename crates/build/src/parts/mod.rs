@@ -89,6 +89,7 @@
 mod assemble;
 mod children;
 mod cut;
+mod exact_values;
 mod fragments;
 mod grid;
 mod node;

@@ -224,11 +224,6 @@ impl Plan {
         if jumps.contains(&true) { jumps } else { Vec::new() }
     }
 
-    /// Whether the exact values of a field are kept.
-    pub fn keeps_exact_values(&self) -> bool {
-        self.fields.iter().any(|field| field.lossless)
-    }
-
     /// How many regions are kept apart.
     pub(super) fn region_count(&self) -> u32 {
         self.regions.as_ref().map_or(0, |regions| regions.all.len() as u32)

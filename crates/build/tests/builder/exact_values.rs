@@ -4,7 +4,7 @@ use crate::support::meshes::{cube, hilly};
 use std::io::Cursor;
 use tetralod::format::{DecodeOptions, EncodeOptions, ExactStatus, FormatError, encode};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{MtKind, VertexId};
+use tetralod::mt::{Exact, MtKind, VertexId};
 use tetralod::refine::Request;
 use tetralod::session::{Client, ClientError, Session, SessionError};
 use tetralod::stream::FileSource;
@@ -63,6 +63,31 @@ fn a_client_has_exact_values_when_it_has_fetched_them() {
     let refused = client.fetch_exact();
     assert!(matches!(refused, Err(ClientError::Format(FormatError::Corrupt { .. }))), "{refused:?}");
     assert!(client.session().mesh().is_some_and(|mesh| mesh.tet_count() > 0));
+}
+
+#[test]
+fn values_of_many_vertices_are_in_several_sections() {
+    let mesh = cube(26, &[hilly]);
+    assert!(mesh.positions.len() as u32 > Exact::IN_A_SECTION);
+    let (bytes, vertices) = file(&mesh);
+    let mut client = open(&bytes);
+    client.refine(&Request::within(0.0)).expect("a sound file");
+    client.fetch_exact().expect("a sound file");
+    assert_eq!(exact(client.session(), &mesh, &vertices), [mesh.positions.len(); 2]);
+    let range = client.session().decoder().exact_range().expect("there are exact values");
+    let sections = &bytes[range.start as usize..range.end as usize];
+    let length = u32::from_le_bytes(sections[4..8].try_into().expect("four"));
+    let (first, second) = sections.split_at(12 + length as usize);
+    assert!(!second.is_empty(), "one section");
+    // Out of order, or twice, they are refused, and nothing has changed.
+    let mut session = open(&bytes).into_session();
+    for sections in [[second, first].concat(), [first, second, second].concat()] {
+        let refused = session.take_exact(&sections);
+        assert!(matches!(refused, Err(FormatError::Corrupt { .. })), "{refused:?}");
+        assert_eq!(session.decoder().exact_status(), ExactStatus::Missing);
+    }
+    session.take_exact(sections).expect("as they are in the file");
+    assert_eq!(session.decoder().exact_status(), ExactStatus::Here);
 }
 
 #[test]

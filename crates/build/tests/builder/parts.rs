@@ -7,7 +7,7 @@ use std::io::Cursor;
 use std::ops::ControlFlow;
 use tetralod::format::{BlockEncoder, BlockShelf, EncodeOptions, encode};
 use tetralod::mesh::{Field, Grid, TetMesh};
-use tetralod::mt::{Mt, MtKind, MultiTessellation, UpdatePages};
+use tetralod::mt::{Exact, ExactValues, Mt, MtKind, MultiTessellation, UpdatePages};
 use tetralod_build::parts::{self, Assembled, InMemory, Node, Part, PartUpdates, PartsError, Plan};
 use tetralod_build::verify::{self, Reference};
 use tetralod_build::{BuildConfig, BuildError, BuildProgress, BuildResult, OnProgress};
@@ -94,21 +94,22 @@ impl Files {
     fn assemble(&self, plan: &Plan) -> BuildResult {
         let (left, updates) = (|node| self.left(node), |node| self.updates(node));
         let built = parts::assemble(plan, &left, &updates, &mut go_on).expect("an MT");
-        if built.exact.is_empty() {
-            let (mut aside, scratch) = (Aside::default(), InMemory::default());
-            let mut encoder = BlockEncoder::new(&mut aside);
-            let take = &mut |builder: &mut _| encoder.take_blocks(builder).map_err(PartsError::other);
-            let made = parts::assemble_blocks(plan, (&left, &updates), &scratch, take, &mut go_on);
-            let Assembled { builder, summary, .. } = made.expect("an MT");
-            let mut bytes = Vec::new();
-            let (mt, len) = encoder.finish(builder, &options(&built), &mut bytes).expect("a file");
-            assert!(bytes == self::bytes(&built), "another file");
-            assert_eq!((mt.info(), summary, len), (built.mt.info(), built.summary, bytes.len() as u64));
-            // Never are all blocks in the MT.
-            let last = built.mt.updates().saturating_sub(1) >> built.mt.page_bits();
-            assert!((0..last).all(|page| !mt.has_page(page)), "blocks that were to be taken");
-            assert_eq!(scratch.names(), [""; 0], "nothing is left in the scratch");
-        }
+        let (mut aside, scratch) = (Aside::default(), InMemory::default());
+        let mut encoder = BlockEncoder::new(&mut aside);
+        let take = &mut |builder: &mut _| encoder.take_blocks(builder).map_err(PartsError::other);
+        let made = parts::assemble_blocks(plan, (&left, &updates), &scratch, take, &mut go_on);
+        let Assembled { builder, summary, exact } = made.expect("an MT");
+        let mut bytes = Vec::new();
+        let (mt, len) = encoder
+            .finish(builder, || exact.tables(Exact::IN_A_SECTION), &options(&built), &mut bytes)
+            .expect("a file");
+        assert!(bytes == self::bytes(&built), "another file");
+        assert_eq!((mt.info(), summary, len), (built.mt.info(), built.summary, bytes.len() as u64));
+        // Never are all blocks in the MT.
+        let last = built.mt.updates().saturating_sub(1) >> built.mt.page_bits();
+        assert!((0..last).all(|page| !mt.has_page(page)), "blocks that were to be taken");
+        let names = if built.exact.is_empty() { &[][..] } else { &["exact"] };
+        assert_eq!(scratch.names(), names, "more is left in the scratch");
         built
     }
 }
@@ -172,6 +173,25 @@ fn one_part_is_the_whole() {
         let one = in_parts(&mesh, &config, 1);
         assert_eq!(one.summary, whole.summary, "{name}");
         assert!(bytes(&one) == bytes(&whole), "{name}: other bytes");
+    }
+}
+
+#[test]
+fn parts_keep_exact_values() {
+    let mut mesh = blocks([26; 3], &[hilly, linear], |_| true);
+    // One of the fields needs double precision, by a value of one part.
+    mesh.fields[0].values.iter_mut().for_each(|x| *x = f64::from(*x as f32));
+    mesh.fields[1].values.iter_mut().for_each(|x| *x = f64::from(*x as f32));
+    mesh.fields[1].values[4000] += 1e-12;
+    let config = BuildConfig { all_fields: true, all_lossless: true, ..BuildConfig::default() };
+    let built = in_parts(&mesh, &config, 8);
+    let [single, double] = &built.exact[..] else { panic!("{} fields", built.exact.len()) };
+    assert!(matches!((&single.values, &double.values), (ExactValues::F32(_), ExactValues::F64(_))));
+    for (exact, field) in built.exact.iter().zip(&mesh.fields) {
+        assert!(exact.vertices.len() > Exact::IN_A_SECTION as usize);
+        for (&vertex, value) in built.vertices.iter().zip(&field.values) {
+            assert_eq!(exact.get(vertex).map(f64::to_bits), Some(value.to_bits()));
+        }
     }
 }
 
