@@ -20,7 +20,7 @@ pub(super) struct ImageFile {
     xml: XmlFile,
     options: ReadOptions,
     dims: [u32; 3],
-    /// The array of each field, by its place among those that are wanted.
+    /// The array of each field, by its number among those that are wanted, from 1 on.
     arrays: Vec<usize>,
 }
 
@@ -49,25 +49,16 @@ impl ImageFile {
         }
         expect_no_ghosts(&reader)?;
         let points: u64 = placement.dims.iter().product();
-        // What cannot be read by parts is found before any is.
         let mut count = 0;
         let [fields, others] = collect(&reader, options, &mut |array, components| {
             count += 1;
+            // What cannot be read by parts is found before any is.
             let stored = xml.stored(&document, array, points.saturating_mul(components as u64))?;
-            stored.floats(0..components as u64).map_err(|reason| Stop::from(reason).at(|| array.place()))
+            stored.floats(0..components as u64).map_err(|reason| Stop::from(reason).at(|| array.place()))?;
+            // So the fields of an array are known by how many values they have.
+            Ok::<_, Stop>(vec![0.0; components * count])
         })?;
-        let mut arrays = vec![0; fields.len()];
-        for wanted in 0..count {
-            // Components of this one are no numbers. Its fields follow one another, and begin with a component.
-            let mut number = 0;
-            let [marked, _] = collect::<Stop>(&reader, options, &mut |_, components| {
-                number += 1;
-                Ok(vec![if number == wanted + 1 { f64::NAN } else { 0.0 }; components])
-            })?;
-            let is_of = |field: &Field| field.values.iter().any(|value| value.is_nan());
-            let first = marked.iter().position(is_of).unwrap_or(arrays.len());
-            arrays[first..].fill(wanted);
-        }
+        let arrays = fields.iter().map(|field| field.values.len()).collect();
         let names = match options.cells {
             CellData::Names => reader.field_names("CellData")?,
             _ => Vec::new(),
@@ -97,7 +88,7 @@ impl Boxes for ImageFile {
         let mut number = 0;
         let mut read = |array: &Array<'_>, components: usize| -> Result<Vec<f64>, Stop> {
             number += 1;
-            if self.arrays[field] + 1 != number {
+            if self.arrays[field] != number {
                 return Ok(Vec::new());
             }
             let each = components as u64;

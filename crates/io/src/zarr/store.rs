@@ -66,7 +66,11 @@ impl Store {
 
     /// The names of the folders in a folder, in their order; none on servers, which need not list what they have.
     pub fn folders(&self) -> Result<Option<Vec<String>>, ReadReason> {
-        let Place::Folder(folder) = &self.place else { return Ok(None) };
+        let folder = match &self.place {
+            Place::Folder(folder) => folder,
+            #[cfg(feature = "http")]
+            Place::Server(_) => return Ok(None),
+        };
         let failed = |error: io::Error| ReadReason::Io(error.to_string());
         let mut names = Vec::new();
         for entry in folder.read_dir().map_err(failed)? {
