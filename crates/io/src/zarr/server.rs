@@ -68,7 +68,8 @@ impl Server {
         if let Some(size) = self.known_size(key) {
             return Ok(size);
         }
-        let size = match self.fetch(key, 0..1)? {
+        // Not one byte: there are servers that take the end of `bytes=0-0` for none, and send the whole.
+        let size = match self.fetch(key, 0..2)? {
             Some((_, Some(total))) => Some(total),
             Some((_, None)) => Some(self.whole(key)?.map_or(0, |bytes| bytes.len() as u64)),
             None => None,
