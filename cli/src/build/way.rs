@@ -104,10 +104,11 @@ pub(super) fn way(
 }
 
 /// About how many bytes the files of the steps of a build in parts take: those of the mesh, at each level what is left and the updates, the points
-/// that a join does not have in memory, and what the last step puts aside.
+/// that a join does not have in memory, and what the last step puts aside. Of 800 million tetrahedra in 1024 parts they are 93 bytes each, in the
+/// last join; fewer parts have fewer levels, and take less.
 fn disk_in_parts([points, tetrahedra, fields]: [u64; 3]) -> u64 {
     let more_fields = fields.saturating_sub(1).saturating_mul(points);
-    tetrahedra.saturating_mul(75).saturating_add(more_fields.saturating_mul(60))
+    tetrahedra.saturating_mul(95).saturating_add(more_fields.saturating_mul(60))
 }
 
 /// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are threads, and
