@@ -194,8 +194,9 @@ pub(crate) struct StoredPoints<'s> {
     files: Vec<String>,
     /// For each tetrahedron the first extent of its bucket.
     first: Vec<Extent>,
-    /// All others, of the few buckets that have several.
-    further: HashMap<u32, Vec<Extent>>,
+    /// All others, of the few buckets that have several, and how many records are in front of each: a large bucket has many, and is read
+    /// piece by piece.
+    further: HashMap<u32, Vec<(u64, Extent)>>,
     blocks: Vec<Block>,
     free_blocks: Vec<u32>,
     /// The block that is being filled.
@@ -247,7 +248,10 @@ impl<'s> StoredPoints<'s> {
         let tets = self.first.len() as u32;
         self.first.extend(take(&mut other.first).into_iter().map(shifted));
         let further = take(&mut other.further).into_iter();
-        self.further.extend(further.map(|(t, all)| (t + tets, all.into_iter().map(shifted).collect())));
+        let all_shifted = |all: Vec<(u64, Extent)>| {
+            all.into_iter().map(|(before, extent)| (before, shifted(extent))).collect()
+        };
+        self.further.extend(further.map(|(t, all)| (t + tets, all_shifted(all))));
         self.in_memory.extend(take(&mut other.in_memory).into_iter().map(|block| blocks + block));
         self.in_memory.extend(other.open.map(|block| blocks + block));
         self.full += other.full + usize::from(other.open.is_some());
@@ -270,27 +274,39 @@ impl<'s> StoredPoints<'s> {
 
     /// The extents of a bucket, in the order in which they were put.
     fn extents(&self, t: u32) -> impl Iterator<Item = Extent> {
-        let first = self.first[t as usize];
+        let (first, further) = self.bucket(t);
+        let further = further.iter().map(|(_, extent)| *extent);
+        std::iter::once(first).chain(further).filter(|extent| extent.count > 0)
+    }
+
+    /// The first extent of a bucket, and those behind it with what is in front of each.
+    fn bucket(&self, t: u32) -> (Extent, &[(u64, Extent)]) {
         let further = if self.further.is_empty() { None } else { self.further.get(&t) };
-        std::iter::once(first).chain(further.into_iter().flatten().copied()).filter(|extent| extent.count > 0)
+        (self.first[t as usize], further.map_or(&[], |all| all))
     }
 
     /// How many points are in a bucket.
     pub fn count(&self, t: u32) -> u64 {
-        self.extents(t).map(|extent| u64::from(extent.count)).sum()
+        let (first, further) = self.bucket(t);
+        let (before, last) = further.last().copied().unwrap_or((0, first));
+        before + u64::from(last.count)
     }
 
     /// Writes some of the records of a bucket behind `out`, in the order in which they were put.
     pub fn copy(&self, t: u32, range: std::ops::Range<u64>, out: &mut Vec<u8>) {
-        let mut start = 0;
-        for extent in self.extents(t) {
+        let (first, further) = self.bucket(t);
+        let is_before = |(before, extent): &(u64, Extent)| before + u64::from(extent.count) <= range.start;
+        let behind = &further[further.partition_point(is_before)..];
+        for &(start, extent) in std::iter::once(&(0, first)).chain(behind) {
+            if start >= range.end {
+                return;
+            }
             let end = start + u64::from(extent.count);
             let [from, to] = [range.start, range.end].map(|at| at.clamp(start, end) - start);
             if from < to {
                 let part = Extent { at: extent.at + from as u16, count: (to - from) as u16, ..extent };
                 self.copy_extent(part, out);
             }
-            start = end;
         }
     }
 
@@ -432,7 +448,8 @@ impl<'s> StoredPoints<'s> {
         }
         let first = take(&mut self.first[t as usize]);
         let further = if self.further.is_empty() { None } else { self.further.remove(&t) };
-        std::iter::once(first).chain(further.into_iter().flatten()).for_each(|extent| self.forget(extent));
+        let further = further.into_iter().flatten().map(|(_, extent)| extent);
+        std::iter::once(first).chain(further).for_each(|extent| self.forget(extent));
     }
 
     /// These records do not count any more.
@@ -449,8 +466,16 @@ impl<'s> StoredPoints<'s> {
     /// Makes what has been stored the bucket of a tetrahedron.
     pub fn put(&mut self, t: u32, extents: Vec<Extent>) {
         let mut extents = extents.into_iter();
-        self.first[t as usize] = extents.next().unwrap_or_default();
-        let further: Vec<Extent> = extents.collect();
+        let first = extents.next().unwrap_or_default();
+        self.first[t as usize] = first;
+        let mut before = u64::from(first.count);
+        let further: Vec<(u64, Extent)> = extents
+            .map(|extent| {
+                let own = (before, extent);
+                before += u64::from(extent.count);
+                own
+            })
+            .collect();
         if further.is_empty() {
             // Most have never had any.
             if !self.further.is_empty() {
