@@ -6,10 +6,11 @@
 
 use crate::error::stored_points::StoredPoints;
 use std::borrow::Borrow;
-use std::ops::{ControlFlow, Range};
+use std::ops::{ControlFlow, Range, RangeInclusive};
 
-/// So many records are in memory at a time, or one of each bucket.
-const AT_A_TIME: u64 = 1 << 10;
+/// So many records are in memory at a time, or one of each bucket: few at first, for most fillings are given up early; behind them as many
+/// as have been looked at, which takes few calls of the scratch.
+const AT_A_TIME: RangeInclusive<u64> = 1 << 10..=1 << 14;
 
 /// A place in the order and what is there: the tetrahedron of the star, and the record.
 pub(crate) type Place = (u64, u8, Vec<u8>);
@@ -85,7 +86,8 @@ impl HolePoints {
     /// Reads the rounds from one on.
     fn load(&mut self, from: u64, tets: impl Iterator<Item = u32>, stored: &StoredPoints<'_>) {
         let with_points = self.counts.iter().filter(|&&count| count > from).count() as u64;
-        self.rounds = from..from + (AT_A_TIME / with_points.max(1)).max(1);
+        let records = (from * with_points).clamp(*AT_A_TIME.start(), *AT_A_TIME.end());
+        self.rounds = from..from + (records / with_points.max(1)).max(1);
         self.records.clear();
         self.starts.clear();
         for (t, &count) in tets.zip(&self.counts) {
