@@ -1,5 +1,5 @@
 //! `cargo xtask bench --first-visit`: how soon the demo's page shows what, in a browser that has never seen it; writes its part of
-//! `docs/benchmarks.md`.
+//! `docs/benchmarks.md`. With a file: what the page takes to show that one, behind a network.
 
 use anyhow::{Result, bail};
 
@@ -16,12 +16,18 @@ of one (a trace of Chromium).
 ";
 
 pub fn run(options: &[String]) -> Result<()> {
-    if let Some(option) = options.first() {
-        bail!("`bench --first-visit` takes no argument, got `{option}`");
-    }
+    let file = match options {
+        [] => None,
+        [file] => Some(std::path::absolute(file)?),
+        [_, other, ..] => bail!("`bench --first-visit` takes at most one FILE.mt, got `{other}`"),
+    };
     package::ensure_built(package::Profile::Released)?;
     // As users get it: it answers while the page is timed.
     let tetralod = shell::released_command()?;
+    if let Some(file) = file {
+        let (_server, mut script) = demo::page_script(&tetralod, &["benches/first_visit/file.js"])?;
+        return shell::run(script.env("TETRALOD_FILE", file));
+    }
     demo::make_all(&tetralod)?;
     let (_server, mut script) = demo::page_script(&tetralod, &["benches/first_visit/run.js"])?;
     let table = shell::output(&mut script)?;

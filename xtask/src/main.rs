@@ -70,7 +70,7 @@ usage: cargo xtask COMMAND
   bench --build [SIZE...]        measure builds of grids with SIZE³ points, whole and in parts, beside VTK's decimation
   bench --parts [SIZE...]        measure how the steps of builds in parts grow, and what more workers bring
   bench --against-vtk [SET...]   measure meshes of equal size by VTK's decimation of tetrahedra, which comes from PyPI
-  bench --first-visit            measure how soon the demo's page shows what
+  bench --first-visit [FILE.mt]  measure how soon the demo's page shows what; of a file, what its requests take over a network
   bench --pictures [OPTION...]   measure the renderer in each mode, on the GPU or in software. Options: --size WxH
                                  --tets N,N,... --grid N --file FILE.mt --pictures N --modes A,B,...
   bench --beside-vtk             measure the same volumes in a browser with VTK's programs
