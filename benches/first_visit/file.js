@@ -80,15 +80,15 @@ async function visit(network) {
     const rows = [];
     const measure = async (name, what) => {
       const [before, start] = [{ ...file.counts }, performance.now()];
-      await what();
+      const stats = (await what()) ?? (await page.evaluate(() => window.tetralodDemo.step ?? window.tetralodDemo.stats));
       const seconds = (performance.now() - start) / 1000;
       const taken = Object.keys(before).map((key) => file.counts[key] - before[key]);
-      const tetrahedra = await page.evaluate(() => window.tetralodDemo.stats?.tetrahedra ?? window.tetralodDemo.step?.tetrahedra ?? 0);
+      const { tetrahedra } = stats;
       rows.push([name, ...taken, seconds, tetrahedra, await pageMemory(control)]);
       console.error(network, rows.at(-1));
     };
-    const refine = (request) => page.evaluate((options) => window.tetralodDemo.viewer.refine(options).then(() => undefined), request);
-    const reached = (condition) => page.waitForFunction(condition, undefined, { polling: 20 });
+    const refine = (request) => page.evaluate((options) => window.tetralodDemo.viewer.refine(options), request);
+    const reached = async (condition) => void (await page.waitForFunction(condition, undefined, { polling: 20 }));
     await measure("the first picture", async () => {
       await page.goto(`${address}?url=${encodeURIComponent(file.url)}`);
       await reached(() => window.tetralodDemo?.firstFrameMs !== undefined || window.tetralodDemo?.state === "failed");

@@ -11,7 +11,7 @@ use tetralod::mesh::{
 use tetralod::mt::{MultiTessellation, Regions};
 use tetralod_build::verify::Reference;
 use tetralod_io as io;
-use tetralod_io::{CellData, FieldSelection, MemoryLimit, ReadOptions, ReadReason, Step};
+use tetralod_io::{CellData, FieldSelection, MemoryLimit, Pieces, ReadOptions, ReadReason, Step};
 
 /// What is known of an input beside its paths.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,6 +92,12 @@ pub fn read_cells(
     files::note_inputs(&mesh.input.files.0);
     say_notes(&mesh.notes, &steps[0].path);
     mend(mesh, level, &steps[0].path)
+}
+
+/// Whether a file may be a regular grid of which boxes are read, by its name: folders are those of Zarr.
+pub fn may_be_grid(path: &Path) -> bool {
+    const ENDINGS: [&str; 7] = ["vti", "raw", "json", "nrrd", "nhdr", "mha", "mhd"];
+    ENDINGS.contains(&files::ending(path).as_str()) || path.is_dir() || files::is_zarr_address(path)
 }
 
 /// Says what the reader left out of a file.
@@ -184,6 +190,40 @@ pub fn expand(mesh: &mut TetMesh, path: &Path) -> Result<()> {
     }
     mesh.expand_grid();
     Ok(())
+}
+
+/// The regular grid that the MT was built from, without values, and the file from which boxes of them are read; none if that one is read as
+/// a whole.
+pub fn open_reference_grid(paths: &[PathBuf], opened: &Opened) -> Result<Option<(TetMesh, Pieces)>> {
+    let info = opened.info()?;
+    let time = info.fields.first().and_then(|field| field.time);
+    let [path] = paths else { return Ok(None) };
+    if !may_be_grid(path)
+        || opened.mt()?.regions().is_some()
+        || info.fields.iter().any(|field| field.time != time)
+    {
+        return Ok(None);
+    }
+    let all = steps(paths)?;
+    let is_wanted = |step: &&Step| time.is_none() || step.time == time;
+    let step = match &all[..] {
+        [only] => only,
+        several if let Some(step) = several.iter().find(is_wanted) => step,
+        _ => return Ok(None),
+    };
+    let names: Vec<String> = info.fields.iter().map(|field| field.name.clone()).collect();
+    let wanted = FieldSelection { names: &names, all: false, labels: &[], cells: CellData::Names };
+    let options = ReadOptions { step: step.number, memory: Source::default().limit(), ..wanted.options() };
+    let Ok(pieces) = Pieces::open_ranges(&step.path, &options, None)? else { return Ok(None) };
+    let Some(mut mesh) = pieces.grid().map(|grid| grid.mesh().clone()) else { return Ok(None) };
+    mesh.fields.iter_mut().for_each(|field| field.time = time);
+    let has_all = info.fields.iter().all(|info| mesh.fields.iter().any(|field| info.is_of(field)));
+    if !has_all || mesh.counts() != [u64::from(info.vertices), info.tetrahedra] {
+        return Ok(None);
+    }
+    files::note_inputs(&mesh.input.files.0);
+    say_notes(&mesh.notes, path);
+    Ok(Some((mesh, pieces)))
 }
 
 /// As [`read_reference`], but a regular grid comes without points and tetrahedra where only its values are needed.

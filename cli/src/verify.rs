@@ -5,12 +5,15 @@ use super::{files, input, output};
 use anyhow::{Context, Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use std::cell::Cell;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MultiTessellation};
 use tetralod_build::verify;
-use tetralod_build::verify::{Reference, Sample, VerifyReport};
+use tetralod_build::verify::{GridValues, Reference, Sample, VerifyReport};
+use tetralod_io::Pieces;
 
 /// Checks every promise of an MT file against the mesh that it was built from; exit code 1 if one is broken.
 #[derive(clap::Args)]
@@ -24,7 +27,8 @@ pub struct Arguments {
     #[arg(long)]
     quick: bool,
     /// Only N requests, for files that do not fit into memory: one for the whole domain, the others for boxes all over it and for values in
-    /// boxes. Each is answered from the file anew, by the blocks that it needs, and its mesh is compared with the input there.
+    /// boxes. Each is answered from the file anew, by the blocks that it needs, and its mesh is compared with the input there: of a regular
+    /// grid that `part` reads layer by layer no more than that is read.
     #[arg(long, value_name = "N", conflicts_with = "quick", value_parser = clap::value_parser!(u32).range(1..))]
     samples: Option<u32>,
     /// Print a JSON object.
@@ -111,7 +115,21 @@ fn run_samples(arguments: &Arguments, count: u32) -> Result<u8> {
             "--samples are compared with the cells of the input; this file was built from points alone: verify it without"
         );
     }
-    let input = input::read_reference_alone(against, &opened)?;
+    let (input, pieces) = match input::open_reference_grid(against, &opened)? {
+        Some((input, pieces)) => (input, Some(pieces)),
+        None => (input::read_reference_alone(against, &opened)?, None),
+    };
+    let grid = pieces.as_ref().and_then(Pieces::grid);
+    let failed = Cell::new(None);
+    let read = |field: usize, points: [Range<u32>; 3]| {
+        let read = grid.map_or(Ok(Vec::new()), |grid| grid.values(field, points));
+        read.map_err(|error| {
+            let said = error.to_string();
+            failed.set(Some(error));
+            said
+        })
+    };
+    let values = grid.map(|grid| GridValues { layers: grid.layers(), read: &read });
     let most = (all / COARSE_PART).max(COARSE_BYTES);
     let curve = opened.session.bytes_by_error(0);
     let coarse = curve.iter().take_while(|point| point.bytes <= most).last();
@@ -126,7 +144,10 @@ fn run_samples(arguments: &Arguments, count: u32) -> Result<u8> {
         client.refine(&sample.request)?;
         read += client.session().fetched();
         let mt = client.session().mt().context("the MT has no base mesh")?;
-        whole.add(verify::run_request(mt, &input, sample));
+        whole.add(verify::run_request(mt, &input, values.as_ref(), sample));
+        if let Some((error, pieces)) = failed.take().zip(pieces.as_ref()) {
+            return Err(pieces.named(error).into());
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();

@@ -13,8 +13,8 @@ use tetralod_build::parts::PartsError;
 use tetralod_build::{BuildConfig, mark_labels};
 use tetralod_io::{CellData, FieldSelection, Pieces, ReadOptions};
 
-/// Endings of files that are read by ranges of cells, and of grids that are read by boxes.
-const BY_RANGES: [&str; 10] = ["vtu", "vtkhdf", "hdf", "vti", "raw", "json", "nrrd", "nhdr", "mha", "mhd"];
+/// Endings of files that are read by ranges of cells.
+const BY_RANGES: [&str; 3] = ["vtu", "vtkhdf", "hdf"];
 
 impl BuildOptions {
     /// Tells what was repaired, and what was found.
@@ -91,9 +91,9 @@ impl BuildOptions {
         let is_list = files::ending(path) == "pvtu";
         let is_known = || {
             let by_ranges = BY_RANGES.contains(&files::ending(path).as_str());
-            // Folders are those of Zarr.
-            let is_zarr = path.is_dir() || files::is_zarr_address(path);
-            Ok::<_, anyhow::Error>(is_list || by_ranges || is_zarr || Pieces::are_beside(path)?)
+            Ok::<_, anyhow::Error>(
+                is_list || by_ranges || input::may_be_grid(path) || Pieces::are_beside(path)?,
+            )
         };
         if needs_whole || !is_known()? {
             return Ok(None);

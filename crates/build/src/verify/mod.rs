@@ -60,7 +60,7 @@ pub use queries::Query as SampleRequest;
 pub use report::MAX_FAILURES;
 pub use report::VerifyReport;
 #[doc(hidden)]
-pub use samples::{run_request, samples};
+pub use samples::{GridValues, run_request, samples};
 #[doc(hidden)]
 pub use shown::run_shown;
 #[doc(hidden)]

@@ -9,6 +9,7 @@ use super::split::{Split, split};
 use super::{Case, VerifyReport, fresh, note, satisfy};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::ops::Range;
 use tetralod::geom::{Bounds, LatticeBox, tet_meets_box};
 use tetralod::mesh::{FACES, Field, Grid, NONE, TetMesh, boundary_faces, kuhn_tets, neighbors};
 use tetralod::mt::{ApplyUpdates, MtInfo, mix};
@@ -22,6 +23,37 @@ const ERRORS: [f64; 4] = [0.0, 0.01, 0.001, 0.0];
 const VALUES_EVERY: usize = 4;
 /// Errors are measured at about so many reference vertices for each request.
 const VERTICES: usize = 20_000;
+
+/// The values of a [grid alone](TetMesh::of_grid_alone) that are not in memory.
+#[derive(Clone, Copy)]
+pub struct GridValues<'a> {
+    /// Layers of points across z that are best read together.
+    pub layers: u32,
+    /// Reads the values of a field, by its number, at the points in a box, x fastest.
+    pub read: &'a dyn Fn(usize, [Range<u32>; 3]) -> Result<Vec<f64>, String>,
+}
+
+impl GridValues<'_> {
+    /// The values of a field at these points of a grid. Of those that follow one another in some layers, the box around them is read.
+    fn at(&self, grid: &Grid, field: usize, points: &[usize]) -> Result<Vec<f64>, String> {
+        let [nx, ny, _] = grid.dims.map(|n| n as usize);
+        let place = |&v: &usize| [v % nx, v / nx % ny, v / (nx * ny)];
+        let slab = |v: usize| v / (nx * ny) / self.layers.max(1) as usize;
+        let mut values = Vec::with_capacity(points.len());
+        for some in points.chunk_by(|&a, &b| slab(a) == slab(b)) {
+            let (low, high) = some.iter().map(place).fold(([usize::MAX; 3], [0; 3]), |(low, high), at| {
+                ([0, 1, 2].map(|k| at[k].min(low[k])), [0, 1, 2].map(|k| at[k].max(high[k])))
+            });
+            let read = (self.read)(field, [0, 1, 2].map(|k| low[k] as u32..high[k] as u32 + 1))?;
+            let [across, rows] = [0, 1].map(|k| high[k] - low[k] + 1);
+            for [x, y, z] in some.iter().map(place) {
+                let value = read.get(x - low[0] + across * (y - low[1] + rows * (z - low[2])));
+                values.push(*value.ok_or("the input lacks values")?);
+            }
+        }
+        Ok(values)
+    }
+}
 
 /// So many requests for an MT of `input`, a mesh or a [grid alone](TetMesh::of_grid_alone): the whole domain within the error `coarse`,
 /// which should be one of a mesh that fits into memory, then boxes all over it, exactly or with an error, and values in boxes. They
@@ -58,14 +90,20 @@ pub fn samples(info: &MtInfo, input: &TetMesh, count: usize, coarse: f64) -> Vec
 /// Checks the mesh of one request against `input`, what the MT was built from, or a [grid alone](TetMesh::of_grid_alone): that it is
 /// valid and conforming and has the topology of the base mesh, that all errors are within their bounds, where they are measured, that the
 /// answer is true, and that coarsening leads back to the base mesh. In a box with error 0 the tetrahedra must be those of the input.
-/// `mt` needs to have only what the request needs.
-pub fn run_request<M: ApplyUpdates>(mt: &M, input: &TetMesh, query: &Query) -> VerifyReport {
-    VerifyReport::of(|report| check(mt, input, query, report))
+/// `mt` needs to have only what the request needs. The fields of a grid alone may have their values `elsewhere`.
+pub fn run_request<M: ApplyUpdates>(
+    mt: &M,
+    input: &TetMesh,
+    elsewhere: Option<&GridValues<'_>>,
+    query: &Query,
+) -> VerifyReport {
+    VerifyReport::of(|report| check(mt, input, elsewhere, query, report))
 }
 
 fn check<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
+    elsewhere: Option<&GridValues<'_>>,
     query: &Query,
     report: &mut VerifyReport,
 ) -> Result<(), String> {
@@ -81,9 +119,9 @@ fn check<M: ApplyUpdates>(
         Some((inside, need)) => {
             let away = need.error.min(1.0) * info.displacement_per_error;
             let wide = Bounds { min: inside.min.map(|x| x - away), max: inside.max.map(|x| x + away) };
-            Near::of(&split, &wide)?
+            Near::of(&split, elsewhere, &wide)?
         }
-        None => Near::sparse(&split)?,
+        None => Near::sparse(&split, elsewhere)?,
     };
     drop(split);
     let mut deviation = Deviation::of(info, near.split(), near.faces.clone(), most)?;
@@ -140,9 +178,9 @@ struct Near {
 
 impl Near {
     /// All tetrahedra whose bounding boxes meet a box.
-    fn of(input: &Split<'_>, inside: &Bounds) -> Result<Self, String> {
+    fn of(input: &Split<'_>, elsewhere: Option<&GridValues<'_>>, inside: &Bounds) -> Result<Self, String> {
         match input.mesh.grid.filter(|_| input.mesh.is_grid_alone()) {
-            Some(grid) => Self::of_grid(&input.mesh, &grid, inside),
+            Some(grid) => Self::of_grid(&input.mesh, &grid, elsewhere, inside),
             None => Self::of_mesh(input, inside),
         }
     }
@@ -155,7 +193,8 @@ impl Near {
         faces: Vec<[u32; 3]>,
     ) -> Result<Self, String> {
         let positions = taken.iter().map(|&v| input.mesh.positions[v]).collect();
-        let mesh = TetMesh { positions, tets, fields: values(&input.mesh, taken)?, ..TetMesh::default() };
+        let mesh =
+            TetMesh { positions, tets, fields: values(&input.mesh, None, taken)?, ..TetMesh::default() };
         let regions = taken.iter().filter_map(|&v| input.regions.get(v).copied()).collect();
         Ok(Self { mesh, faces, regions, may_move: input.may_move })
     }
@@ -166,7 +205,12 @@ impl Near {
         Split { mesh, joined, regions: self.regions.clone(), may_move: self.may_move }
     }
 
-    fn of_grid(input: &TetMesh, grid: &Grid, inside: &Bounds) -> Result<Self, String> {
+    fn of_grid(
+        input: &TetMesh,
+        grid: &Grid,
+        elsewhere: Option<&GridValues<'_>>,
+        inside: &Bounds,
+    ) -> Result<Self, String> {
         // From this point to that one, with one to spare.
         let [mut low, mut high] = [[0_u32; 3]; 2];
         for k in 0..3 {
@@ -186,7 +230,8 @@ impl Near {
         let taken: Vec<usize> = indices.iter().map(|&index| of_whole(index)).collect();
         let tets = kuhn_tets(dims);
         let positions = indices.iter().map(|&index| grid.point(index)).collect();
-        let mesh = TetMesh { positions, tets, fields: values(input, &taken)?, ..TetMesh::default() };
+        let fields = values(input, elsewhere, &taken)?;
+        let mesh = TetMesh { positions, tets, fields, ..TetMesh::default() };
         let across = neighbors(&mesh.tets).map_err(|error| format!("the input: {error}"))?;
         let is_side = |face: &[u32; 3]| {
             (0..3).any(|k| {
@@ -245,7 +290,7 @@ impl Near {
     }
 
     /// Some points from all over the domain, and its boundary, without tetrahedra.
-    fn sparse(split: &Split<'_>) -> Result<Self, String> {
+    fn sparse(split: &Split<'_>, elsewhere: Option<&GridValues<'_>>) -> Result<Self, String> {
         let Split { mesh: input, joined, .. } = split;
         let [points, _] = input.counts();
         let stride = (points as usize).div_ceil(VERTICES).max(1);
@@ -272,19 +317,28 @@ impl Near {
         let across = neighbors(&cube).map_err(|error| format!("the input: {error}"))?;
         let faces = boundary_faces(&cube, &across).map(|(_, face)| face.map(|v| first + v)).collect();
         let positions = indices.iter().map(|index| grid.point(index.map(|i| i as u32))).collect();
-        let mesh = TetMesh { positions, fields: values(input, &taken)?, ..TetMesh::default() };
+        let mesh = TetMesh { positions, fields: values(input, elsewhere, &taken)?, ..TetMesh::default() };
         Ok(Self { mesh, faces, regions: Vec::new(), may_move: false })
     }
 }
 
 /// The fields at these points.
-fn values(input: &TetMesh, points: &[usize]) -> Result<Vec<Field>, String> {
-    let of = |field: &Field| {
-        let values: Option<Vec<f64>> = points.iter().map(|&v| field.values.get(v).copied()).collect();
-        let values = values.ok_or_else(|| format!("the input: field '{}' lacks values", field.name))?;
+fn values(
+    input: &TetMesh,
+    elsewhere: Option<&GridValues<'_>>,
+    points: &[usize],
+) -> Result<Vec<Field>, String> {
+    let of = |(number, field): (usize, &Field)| {
+        let values = match (elsewhere, &input.grid) {
+            (Some(elsewhere), Some(grid)) => elsewhere.at(grid, number, points)?,
+            _ => {
+                let values: Option<Vec<f64>> = points.iter().map(|&v| field.values.get(v).copied()).collect();
+                values.ok_or_else(|| format!("the input: field '{}' lacks values", field.name))?
+            }
+        };
         Ok(Field { values, ..field.without_values() })
     };
-    input.fields.iter().map(of).collect()
+    input.fields.iter().enumerate().map(of).collect()
 }
 
 /// Whether the tetrahedra in a box are those of the input near it. Those that only touch its rim may be either.

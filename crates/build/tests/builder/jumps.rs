@@ -253,7 +253,7 @@ fn parts_keep_the_values_of_each_region() {
             let report = verify::run_sample(mt, &mesh, Reference::Mesh, sample, &mut |_, _| {});
             assert!(report.valid, "{parts}: {:#?}", report.failures);
             for sample in verify::samples(mt.info(), &mesh, 12, 0.05) {
-                let report = verify::run_request(mt, &mesh, &sample);
+                let report = verify::run_request(mt, &mesh, None, &sample);
                 assert!(report.valid, "{parts}, {}: {:#?}", sample.name, report.failures);
             }
         }
@@ -266,7 +266,7 @@ fn single_requests_are_verified_on_each_side() {
     let mt = built(&mesh);
     let failures = |input: &TetMesh| {
         let samples = verify::samples(mt.info(), input, 12, 0.05);
-        let of = |sample| verify::run_request(&mt, input, sample).failures;
+        let of = |sample| verify::run_request(&mt, input, None, sample).failures;
         samples.iter().flat_map(of).collect::<Vec<String>>()
     };
     assert_eq!(failures(&mesh), [""; 0]);
