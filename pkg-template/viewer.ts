@@ -598,8 +598,9 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
 
   /**
    * Requests another mesh. While the file streams in, and with the camera's own view while that moves, the mesh follows
-   * this request. Resolves when the mesh is complete; a call that was replaced resolves together with the later one. A request that
-   * is refused, with code `bad-option`, changes nothing.
+   * this request. Resolves when the mesh is what the data that has arrived allows; a call that was replaced resolves together with the later
+   * one. If more data is on its way, `limitedBy` of the answer is `"network"`: `settled` waits for all of it. A request that is refused, with
+   * code `bad-option`, changes nothing.
    *
    * `signal` ends the wait: the call rejects with the signal's reason, by default an `AbortError`, and the request before it holds
    * again.
@@ -607,7 +608,8 @@ export class Viewer extends withMeshTools<AwaitOptions & { request?: never }, Vi
    * @example
    * await viewer.refine({ view: { pixels: 1, outside: "10%" }, maxTets: 300_000 });
    * @example
-   * await viewer.refine({ error: "0.1%" }, { signal: AbortSignal.timeout(2000) });
+   * const { limitedBy } = await viewer.refine({ error: "0.1%" }, { signal: AbortSignal.timeout(2000) });
+   * if (limitedBy === "network") await viewer.settled();
    */
   async refine(options: ViewerRefineOptions = {}, how: { signal?: AbortSignal | undefined } = {}): Promise<ViewerStats> {
     const { signal, ...others } = how;

@@ -87,7 +87,13 @@ async function visit(network) {
       rows.push([name, ...taken, seconds, tetrahedra, await pageMemory(control)]);
       console.error(network, rows.at(-1));
     };
-    const refine = (request) => page.evaluate((options) => window.tetralodDemo.viewer.refine(options), request);
+    const refine = (request) =>
+      page.evaluate(async (options) => {
+        const { viewer } = window.tetralodDemo;
+        const stats = new Promise((resolve) => viewer.addEventListener("stats", ({ detail }) => detail.satisfied && resolve(detail)));
+        await viewer.refine(options);
+        return stats;
+      }, request);
     const reached = async (condition) => void (await page.waitForFunction(condition, undefined, { polling: 20 }));
     await measure("the first picture", async () => {
       await page.goto(`${address}?url=${encodeURIComponent(file.url)}`);

@@ -1,5 +1,5 @@
 //! Promise: an MT file of a Zarr array has the bytes of that of the same samples in another format, whole and in parts, of which each reads the
-//! chunks that it needs; an address that is none of Zarr is refused.
+//! chunks that it needs, as does `verify --samples`; an address that is none of Zarr is refused.
 
 use crate::support::{Folder, bad, good, json, run, text};
 use std::fs;
@@ -102,6 +102,26 @@ fn the_whole_and_its_parts_are_those_of_other_formats() {
             &["floats.zarr", "chunk \"1.1.1\"", "damaged"],
         );
     }
+}
+
+#[test]
+fn samples_are_verified_against_boxes_of_a_grid() {
+    let folder = Folder::new("zarr-verify");
+    let [zarr, raw] = write(&folder, "floats", ["<f4", "float32"], &|x| x.to_le_bytes().to_vec());
+    let mt = folder.path("one.mt");
+    good(&["build", &zarr, "-o", &mt, "--quiet"]);
+    let verify = ["verify", &mt, "--samples", "9", "--json", "--against"];
+    let reports = [&zarr, &raw].map(|input| json(&[&verify[..], &[input.as_str()]].concat()));
+    assert_eq!((&reports[0]["valid"], &reports[0]["queries"]), (&true.into(), &9.into()));
+    assert_eq!(reports[0], reports[1]);
+    // What cannot be read is an error of the input, and none of the file.
+    let samples = raw.replace(".json", ".raw");
+    let mut bytes = fs::read(&samples).expect("a file");
+    bytes[4 * 4000..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    fs::write(&samples, bytes).expect("a file");
+    bad(1, &[&verify[..], &[&raw]].concat(), &["floats.json", "point 4000"]);
+    fs::write(format!("{zarr}/1.1.1"), "cut").expect("a file");
+    bad(1, &[&verify[..], &[&zarr]].concat(), &["floats.zarr", "chunk \"1.1.1\"", "damaged"]);
 }
 
 #[test]
