@@ -216,7 +216,9 @@ pub fn open_reference_grid(paths: &[PathBuf], opened: &Opened) -> Result<Option<
     let options = ReadOptions { step: step.number, memory: Source::default().limit(), ..wanted.options() };
     let Ok(pieces) = Pieces::open_ranges(&step.path, &options, None)? else { return Ok(None) };
     let Some(mut mesh) = pieces.grid().map(|grid| grid.mesh().clone()) else { return Ok(None) };
-    mesh.fields.iter_mut().for_each(|field| field.time = time);
+    if step.time.is_some() {
+        mesh.fields.iter_mut().for_each(|field| field.time = step.time);
+    }
     let has_all = info.fields.iter().all(|info| mesh.fields.iter().any(|field| info.is_of(field)));
     if !has_all || mesh.counts() != [u64::from(info.vertices), info.tetrahedra] {
         return Ok(None);
